@@ -1,0 +1,21 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include <opencv2/core/mat.hpp>
+
+namespace scanview {
+
+/// A picture as it is in the file: 8 or 16 bits, 1, 3 or 4 channels, OpenCV's channel order (BGR). Throws
+/// Error{bad_input} where the file is missing, truncated, or no picture; the library alone would return gray rows or an
+/// empty image. Pictures of more than 2^28 pixels are refused.
+cv::Mat read_image(std::filesystem::path const& path);
+
+/// 8-bit BGR of any picture: gray is repeated, alpha dropped, 16 bits divided by 257.
+cv::Mat3b read_color(std::filesystem::path const& path);
+
+/// PNG or JPEG bytes; deterministic.
+std::string encode_png(cv::Mat const& image);
+std::string encode_jpeg(cv::Mat const& image, int quality = 90);
+
+}  // namespace scanview

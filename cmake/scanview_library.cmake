@@ -1,0 +1,22 @@
+# scanview_library(NAME SOURCES ... PUBLIC ... PRIVATE ...): the library of one folder, alias scanview::NAME.
+# PUBLIC and PRIVATE name what it links. Headers are included from the root of the tree: "mesh/view_mesh.h".
+function(scanview_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(scanview_${name} STATIC ${ARG_SOURCES})
+  add_library(scanview::${name} ALIAS scanview_${name})
+  set_target_properties(scanview_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(scanview_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                                                     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/scanview>)
+  target_link_libraries(scanview_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  scanview_compile_options(scanview_${name})
+  set_property(GLOBAL APPEND PROPERTY SCANVIEW_LIBRARIES scanview_${name})
+endfunction()
+
+# Warnings (errors at top level) and arithmetic that is the same in every build.
+function(scanview_compile_options target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_options(${target} PRIVATE -ffp-contract=off -Wall -Wextra)
+  if(PROJECT_IS_TOP_LEVEL)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+endfunction()

@@ -1,0 +1,27 @@
+#pragma once
+#include <filesystem>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+namespace scanview {
+
+/// Triangles over shared vertices, counter-clockwise seen from outside. `colors` is empty or has one 8-bit sRGB colour
+/// (BGR) a vertex.
+struct TriangleMesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Eigen::Vector3i> triangles;
+  std::vector<cv::Vec3b> colors;
+
+  /// Throws std::logic_error where an index is out of range or a vertex is not finite.
+  void check() const;
+};
+
+/// PLY (any format; polygons are fanned, tristrips unrolled) or OBJ (positions, faces, vertex colours), by the file's
+/// ending, also gzipped (.ply.gz, .obj.gz). Throws Error{bad_input}; indices out of range and non-finite vertices are errors.
+TriangleMesh read_triangle_mesh(std::filesystem::path const& path);
+/// Binary little-endian PLY; whole or not at all.
+void write_triangle_mesh(std::filesystem::path const& path, TriangleMesh const& mesh);
+
+}  // namespace scanview

@@ -1,0 +1,66 @@
+#pragma once
+#include <filesystem>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "base/context.h"
+#include "base/html.h"
+#include "calib/camera.h"
+#include "acquire/scan_set.h"
+#include "mesh/triangle_mesh.h"
+
+namespace scanview {
+
+/// The small textured mesh of one view. Vertices are in the view's camera coordinates (mesh.colors is empty); the
+/// texture is the view's colour picture, mapped projectively: the homogeneous texture coordinates of a vertex p are
+/// (s·w, t·w, 0, w), w its depth (Darsa 1998, appendix), which a renderer takes from `camera` and p.
+struct ViewMesh {
+  Camera camera;
+  TriangleMesh mesh;
+  std::vector<float> cos_phi;   ///< a triangle: cosine between its normal and the ray to the source camera (Pulli 1997)
+  cv::Mat1b feather;            ///< a pixel of the camera: 0 outside the mesh, rising linearly to 255 with the distance
+                                ///< in pixels from its boundary
+};
+
+struct MeshOptions {
+  enum class Tolerance { units, sigmas, automatic } tolerance_kind = Tolerance::automatic;
+  double tolerance = 3.0;          ///< greatest distance in depth, in units or in multiples of each pixel's sigma
+  int max_triangles = 0;           ///< a view; 0: as many as the tolerance needs
+  double step_sigmas = 6.0;        ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
+  double max_angle_deg = 80.0;     ///< triangles that are seen more grazingly are dropped
+  int feather_px = 16;             ///< distance from the boundary at which the feather weight is full
+  void validate() const;
+};
+
+/// Depth error of a mesh over the pixels of its range image: along the ray, at pixels the mesh covers.
+struct MeshFigures {
+  std::size_t triangles = 0;
+  double rms = 0, p95 = 0, max = 0;   ///< units
+  double uncovered = 0;                ///< share of object pixels that no triangle covers
+};
+
+struct ViewMeshResult {
+  ViewMesh view_mesh;
+  MeshFigures figures;
+  double tolerance = 0;                ///< used: in units (units), or multiples of sigma
+};
+
+/// Meshes one range image: outline and step edges as constraints, greedy insertion of the worst pixel (Garland and
+/// Heckbert 1995) into a constrained Delaunay triangulation (CGAL), until every pixel is within tolerance. An image
+/// with too few depths for a triangle gives an empty mesh. n log n.
+ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& options, Context& context);
+
+/// mesh.ply (exact, with `cos` a triangle) and feather.png of one view; reading checks sizes and indices.
+void write_view_mesh(std::filesystem::path const& view_folder, ViewMesh const& view_mesh);
+ViewMesh read_view_mesh(std::filesystem::path const& view_folder, Camera const& camera);
+
+/// GLB for other programs (DESIGN §3): y up, z backward by a node transform that also holds the unit; plain (s, t), with
+/// triangles split where that would be off by more than half a texel. Embeds the colour picture.
+std::string encode_glb(std::vector<ViewMesh const*> const& meshes, ScanSet const& set,
+                       std::vector<std::size_t> const& view_indices);
+
+/// Wireframes over the pictures, counts and errors.
+ReportSection mesh_section(ScanSet const& set, std::vector<ViewMeshResult> const& results);
+
+}  // namespace scanview
