@@ -1,8 +1,7 @@
 #pragma once
+#include <Eigen/Core>
 #include <cstdint>
 #include <limits>
-
-#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 #include "calib/camera.h"
@@ -13,11 +12,11 @@ inline constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 
 /// What a pixel is, and why a depth is missing. The values are those of mask.png: far enough apart to be seen.
 enum class PixelClass : std::uint8_t {
-  background = 0,     ///< not the object: static background, empty scene, backdrop
-  cut = 40,           ///< outside the box or below the ground plane that was asked for
-  outlier = 80,       ///< a depth that stands alone or flies between two surfaces
-  no_depth = 160,     ///< object (or unknown), but the sensor gave nothing
-  object = 255,       ///< has a depth
+  background = 0,  ///< not the object: static background, empty scene, backdrop
+  cut = 40,        ///< outside the box or below the ground plane that was asked for
+  outlier = 80,    ///< a depth that stands alone or flies between two surfaces
+  no_depth = 160,  ///< object (or unknown), but the sensor gave nothing
+  object = 255,    ///< has a depth
 };
 
 /// Colour and range from one camera. depth, sigma, color and classes have the camera's size. A depth is finite and
@@ -26,10 +25,10 @@ enum class PixelClass : std::uint8_t {
 /// being built.
 struct RangeImage {
   Camera camera;
-  cv::Mat1f depth;          ///< z along the camera axis, in the set's unit
-  cv::Mat1f sigma;          ///< one standard deviation of depth, same unit
+  cv::Mat1f depth;  ///< z along the camera axis, in the set's unit
+  cv::Mat1f sigma;  ///< one standard deviation of depth, same unit
   cv::Mat3b color;
-  cv::Mat1b classes;        ///< PixelClass
+  cv::Mat1b classes;  ///< PixelClass
 
   bool has_depth(int x, int y) const { return classes(y, x) == static_cast<std::uint8_t>(PixelClass::object); }
   Eigen::Vector3d point(int x, int y) const { return camera.unproject(x, y, depth(y, x)); }

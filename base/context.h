@@ -14,9 +14,9 @@ namespace scanview {
 /// All members may be called from several threads; callbacks are called one at a time.
 class Context {
  public:
-  std::uint64_t seed = 1;                         ///< of every random choice (see random.h)
-  int threads = 0;                                ///< at most so many; 0: all processors
-  std::atomic<bool> const* cancelled = nullptr;   ///< set by the caller to stop the work
+  std::uint64_t seed = 1;                              ///< of every random choice (see random.h)
+  int threads = 0;                                     ///< at most so many; 0: all processors
+  std::atomic<bool> const* cancelled = nullptr;        ///< set by the caller to stop the work
   std::function<void(std::string const&)> on_log;      ///< one line of information, without newline
   std::function<void(std::string const&)> on_warning;  ///< one line that a person should read
   /// Progress of a stage: done of total steps, done never falls.

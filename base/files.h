@@ -1,10 +1,9 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
-
-#include <nlohmann/json.hpp>
 
 namespace scanview {
 
@@ -20,7 +19,8 @@ Json read_json(std::filesystem::path const& path);
 /// no permission) and leaves the old file as it was. An orphan of a killed run is overwritten by the next.
 void write_file(std::filesystem::path const& path, std::string_view bytes);
 
-/// Two-space indented, keys in insertion order. Refuses non-finite numbers (JSON has none) by throwing std::logic_error.
+/// Two-space indented, keys in insertion order. Refuses non-finite numbers (JSON has none) by throwing
+/// std::logic_error.
 void write_json(std::filesystem::path const& path, Json const& json);
 
 /// A folder that appears whole or not at all: write into `path()` (FINAL.partial), then `commit()` renames it to FINAL,

@@ -1,15 +1,14 @@
 #pragma once
+#include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
-
-#include <opencv2/core/mat.hpp>
 
 namespace scanview {
 
 /// A stage's part of report.html: a title and HTML that needs nothing from outside (pictures embedded). It holds no
 /// times, so that it is as reproducible as the stage's other output.
 struct ReportSection {
-  std::string id;     ///< "register": the anchor, and the file name report/ID.html inside a set
+  std::string id;  ///< "register": the anchor, and the file name report/ID.html inside a set
   std::string title;
   std::string html;
 };
@@ -30,13 +29,13 @@ std::string html_table(std::vector<std::vector<std::string>> const& rows);
 struct PlotCurve {
   std::string name;
   std::vector<cv::Point2d> points;
-  std::string color;   ///< CSS colour
+  std::string color;  ///< CSS colour
   bool dots = false;
 };
 struct PlotOptions {
   std::string x_label, y_label;
   bool log_x = false, log_y = false;
-  bool equal_scale = false;   ///< one unit is as long on both axes (cross-sections)
+  bool equal_scale = false;  ///< one unit is as long on both axes (cross-sections)
   int width = 480, height = 320;
 };
 /// SVG with axes, ticks, a legend. Non-finite points are left out; an empty plot says "no data".

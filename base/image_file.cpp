@@ -16,11 +16,14 @@ std::string encode(cv::Mat const& image, char const* extension, std::vector<int>
   return {bytes.begin(), bytes.end()};
 }
 
-bool starts_with(std::string const& bytes, std::string_view magic) { return bytes.compare(0, magic.size(), magic) == 0; }
+bool starts_with(std::string const& bytes, std::string_view magic) {
+  return bytes.compare(0, magic.size(), magic) == 0;
+}
 
 /// The decoders fill the missing rows of a truncated file with gray and report success: look for the end marker.
 bool is_complete(std::string const& bytes) {
-  if (starts_with(bytes, "\x89PNG")) return bytes.find("IEND", bytes.size() > 64 ? bytes.size() - 64 : 0) != std::string::npos;
+  if (starts_with(bytes, "\x89PNG"))
+    return bytes.find("IEND", bytes.size() > 64 ? bytes.size() - 64 : 0) != std::string::npos;
   if (starts_with(bytes, "\xff\xd8")) return bytes.rfind("\xff\xd9") != std::string::npos;
   return true;
 }

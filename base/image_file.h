@@ -1,8 +1,7 @@
 #pragma once
 #include <filesystem>
-#include <string>
-
 #include <opencv2/core/mat.hpp>
+#include <string>
 
 namespace scanview {
 

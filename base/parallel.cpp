@@ -24,9 +24,7 @@ void for_each_index(Context& context, std::size_t count, std::function<void(std:
   };
   int const threads = context.threads > 0 ? context.threads : oneapi::tbb::task_arena::automatic;
   oneapi::tbb::task_arena arena(threads);
-  arena.execute([&] {
-    oneapi::tbb::parallel_for(std::size_t{0}, count, one, oneapi::tbb::simple_partitioner());
-  });
+  arena.execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, one, oneapi::tbb::simple_partitioner()); });
   for (auto const& error : errors)
     if (error) std::rethrow_exception(error);
 }

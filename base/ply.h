@@ -14,9 +14,9 @@ struct PlyProperty {
   std::string name;
   PlyType type = PlyType::float32;
   bool is_list = false;
-  PlyType count_type = PlyType::uint8;   ///< of a list
-  std::vector<double> values;            ///< every PLY type is exact in a double
-  std::vector<std::uint64_t> offsets;    ///< of a list: row r is values[offsets[r]] .. values[offsets[r + 1]]
+  PlyType count_type = PlyType::uint8;  ///< of a list
+  std::vector<double> values;           ///< every PLY type is exact in a double
+  std::vector<std::uint64_t> offsets;   ///< of a list: row r is values[offsets[r]] .. values[offsets[r + 1]]
 };
 
 struct PlyElement {

@@ -10,9 +10,9 @@ class CounterRandom {
  public:
   CounterRandom(std::uint64_t seed, std::uint64_t item, std::uint64_t iteration = 0);
   std::uint64_t bits();
-  double uniform();                                ///< in [0, 1)
-  double normal();                                 ///< mean 0, standard deviation 1 (Box-Muller)
-  std::uint32_t below(std::uint32_t bound);        ///< in [0, bound), bound > 0
+  double uniform();                          ///< in [0, 1)
+  double normal();                           ///< mean 0, standard deviation 1 (Box-Muller)
+  std::uint32_t below(std::uint32_t bound);  ///< in [0, bound), bound > 0
 
  private:
   std::uint64_t state_;

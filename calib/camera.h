@@ -1,7 +1,6 @@
 #pragma once
-#include <string>
-
 #include <Eigen/Geometry>
+#include <string>
 
 #include "base/files.h"
 
@@ -33,12 +32,13 @@ class Camera {
   Eigen::Vector2d project(Eigen::Vector3d const& p_camera) const;
   /// The point of pixel (u, v) at depth z, in camera coordinates.
   Eigen::Vector3d unproject(double u, double v, double z) const;
-  /// The ray through a pixel: from the origin, direction with z = 1 (perspective); from (x, y, 0) along z (orthographic).
+  /// The ray through a pixel: from the origin, direction with z = 1 (perspective); from (x, y, 0) along z
+  /// (orthographic).
   Eigen::Vector3d ray_origin(double u, double v) const;
   Eigen::Vector3d ray_direction(double u, double v) const;
   /// Width of a pixel at depth z on a plane facing the camera, in units: the sampling density's inverse.
   double pixel_size(double z) const { return is_perspective() ? z / fx_ : 1.0 / fx_; }
-  bool contains(Eigen::Vector2d const& pixel) const;   ///< within the picture's outline, -0.5 .. size - 0.5
+  bool contains(Eigen::Vector2d const& pixel) const;  ///< within the picture's outline, -0.5 .. size - 0.5
 
   /// The same view in a picture of another size (pixel areas keep their place: u' + ½ = s (u + ½)).
   Camera resized(int width, int height) const;
@@ -55,6 +55,7 @@ class Camera {
   Model model_ = Model::perspective;
   int width_ = 0, height_ = 0;
   double fx_ = 1, fy_ = 1, cx_ = 0, cy_ = 0;
+  double spacing_x_ = 1, spacing_y_ = 1;  ///< orthographic: kept beside fx, so that files round-trip bit by bit
 };
 
 /// Row by row, 16 numbers. Reading checks the last row, finiteness, and that the upper left is a rotation

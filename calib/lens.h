@@ -1,7 +1,6 @@
 #pragma once
-#include <filesystem>
-
 #include <Eigen/Core>
+#include <filesystem>
 #include <opencv2/core/mat.hpp>
 
 #include "base/files.h"
