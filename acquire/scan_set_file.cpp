@@ -101,8 +101,7 @@ Eigen::Vector3d triple(Json const& json, char const* key, fs::path const& path) 
 Json to_json(Eigen::Vector3d const& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 Json to_json(ErrorPart const& part) {
-  auto const known = [](double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); };
-  return {{"rms", known(part.rms)}, {"p95", known(part.p95)}};
+  return {{"rms", json_number(part.rms)}, {"p95", json_number(part.p95)}};
 }
 
 ErrorPart error_part(Json const& budget, char const* key, fs::path const& path) {

@@ -122,6 +122,8 @@ void write_json(fs::path const& path, Json const& json) {
   write_file(path, json.dump(2) + "\n");
 }
 
+Json json_number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
 NewFolder::NewFolder(fs::path final_path) : final_(std::move(final_path)) {
   if (!final_.has_filename()) final_ = final_.parent_path();  // "out/" means "out"
   partial_ = final_;

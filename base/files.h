@@ -23,6 +23,9 @@ void write_file(std::filesystem::path const& path, std::string_view bytes);
 /// std::logic_error.
 void write_json(std::filesystem::path const& path, Json const& json);
 
+/// The number, or null where it is not finite: not measured, or nothing to measure.
+Json json_number(double value);
+
 /// A folder that appears whole or not at all: write into `path()` (FINAL.partial), then `commit()` renames it to FINAL,
 /// replacing a folder that was there. Without commit the destructor removes it.
 class NewFolder {
