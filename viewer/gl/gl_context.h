@@ -15,8 +15,9 @@ class GlContext {
   virtual Function get_proc(char const* name) const = 0;
 };
 
-/// Off-screen, no display needed: OSMesa loaded with dlopen, else surfaceless EGL likewise. Throws Error{io} where
-/// neither is installed, saying which package to install.
-std::unique_ptr<GlContext> make_offscreen_context();
+/// Off-screen, no display needed: OSMesa loaded with dlopen, else surfaceless EGL likewise (or only the one asked for).
+/// Throws Error{io} where neither is installed, saying which package to install.
+enum class OffscreenKind { any, osmesa, egl };
+std::unique_ptr<GlContext> make_offscreen_context(OffscreenKind kind = OffscreenKind::any);
 
 }  // namespace scanview

@@ -1,0 +1,161 @@
+#include "viewer/blend/soft_z_compositor.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "acquire/range_image.h"
+#include "base/error.h"
+
+namespace scanview {
+namespace {
+
+// One triangle over the whole picture.
+constexpr char kVertexShader[] = R"(#version 330 core
+void main() {
+  vec2 corner = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
+  gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+}
+)";
+
+// Colour goes out as B, G, R, A: the order of the picture in memory.
+constexpr char kFragmentShader[] = R"(#version 330 core
+const int MAX_LAYERS = 24;
+uniform sampler2DArray color_layers;
+uniform sampler2DArray depth_layers;
+uniform int layer_count;
+uniform float view_weight[MAX_LAYERS];
+uniform float threshold;
+uniform float ramp;               // 1 / (half a threshold)
+uniform float reliability_ratio;
+layout(location = 0) out vec4 out_color;
+layout(location = 1) out float out_depth;
+
+float hide(float distance) { return clamp((distance - threshold) * ramp, 0.0, 1.0); }
+
+float srgb(float x) {
+  x = clamp(x, 0.0, 1.0);
+  return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055;
+}
+
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float w[MAX_LAYERS];
+  float z[MAX_LAYERS];
+  int layer[MAX_LAYERS];
+  int count = 0;
+  for (int i = 0; i < layer_count; ++i) {
+    float weight = texelFetch(color_layers, ivec3(pixel, i), 0).a * view_weight[i];
+    if (weight > 0.0) {
+      w[count] = weight;
+      z[count] = texelFetch(depth_layers, ivec3(pixel, i), 0).r;
+      layer[count] = i;
+      ++count;
+    }
+  }
+  float reliable[MAX_LAYERS];
+  for (int i = 0; i < count; ++i) {
+    float doubt = 0.0;
+    for (int j = 0; j < count; ++j) {
+      float low = clamp(2.0 - 2.0 * w[i] / (reliability_ratio * w[j] + 1e-30), 0.0, 1.0);
+      doubt = max(doubt, hide(z[j] - z[i]) * low);
+    }
+    reliable[i] = 1.0 - doubt;
+  }
+  vec4 sum = vec4(0.0);
+  float depth = 0.0;
+  for (int k = 0; k < count; ++k) {
+    float hidden = 0.0;
+    for (int i = 0; i < count; ++i) hidden = max(hidden, reliable[i] * hide(z[k] - z[i]));
+    float weight = w[k] * reliable[k] * (1.0 - hidden);
+    sum += weight * vec4(texelFetch(color_layers, ivec3(pixel, layer[k]), 0).rgb, 1.0);
+    depth += weight * z[k];
+  }
+  if (sum.a > 0.0) {
+    vec3 color = sum.rgb / sum.a;
+    out_color = vec4(srgb(color.b), srgb(color.g), srgb(color.r), 1.0);
+    out_depth = depth / sum.a;
+  } else {
+    out_color = vec4(0.0);
+    out_depth = 0.0;
+  }
+}
+)";
+
+}  // namespace
+
+SoftZCompositor::SoftZCompositor(GlFunctions const& gl)
+    : gl_(gl), program_(gl, kVertexShader, kFragmentShader), no_vertices_(gl), framebuffer_(gl) {}
+
+void SoftZCompositor::resize(int width, int height) {
+  if (width == width_ && height == height_) return;
+  width_ = height_ = 0;
+  color_ = GlTexture(gl_);
+  gl_.BindTexture(GL_TEXTURE_2D, color_.name());
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  depth_ = GlTexture(gl_);
+  gl_.BindTexture(GL_TEXTURE_2D, depth_.name());
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_R32F, width, height, 0, GL_RED, GL_FLOAT, nullptr);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
+  gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, color_.name(), 0);
+  gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, GL_TEXTURE_2D, depth_.name(), 0);
+  GLenum const buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+  gl_.DrawBuffers(2, buffers);
+  if (gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+    throw Error(ErrorCode::io, {}, "OpenGL cannot draw into float textures here");
+  }
+  check_gl(gl_, "the composed picture");
+  width_ = width;
+  height_ = height;
+}
+
+Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<double> const& view_weights, double threshold,
+                               double reliability_ratio) {
+  if (view_weights.size() > static_cast<std::size_t>(kMaxLayers)) {
+    throw std::logic_error("SoftZCompositor: too many layers");
+  }
+  resize(layers.width(), layers.height());
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
+  gl_.Viewport(0, 0, width_, height_);
+  gl_.Disable(GL_DEPTH_TEST);
+  gl_.Disable(GL_CULL_FACE);
+  program_.use();
+  gl_.ActiveTexture(GL_TEXTURE0);
+  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, layers.color());
+  gl_.ActiveTexture(GL_TEXTURE1);
+  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, layers.depth());
+  gl_.Uniform1i(program_.uniform("color_layers"), 0);
+  gl_.Uniform1i(program_.uniform("depth_layers"), 1);
+  gl_.Uniform1i(program_.uniform("layer_count"), static_cast<GLint>(view_weights.size()));
+  std::vector<float> weights(view_weights.begin(), view_weights.end());
+  weights.resize(kMaxLayers, 0.0F);
+  gl_.Uniform1fv(program_.uniform("view_weight"), kMaxLayers, weights.data());
+  // Infinite and zero thresholds stay finite in the shader's arithmetic and mean the same.
+  constexpr double kLargest = 1e30, kSteepest = 1e30;
+  threshold = std::min(threshold, kLargest);
+  gl_.Uniform1f(program_.uniform("threshold"), static_cast<float>(threshold));
+  gl_.Uniform1f(program_.uniform("ramp"),
+                static_cast<float>(threshold > 0 ? std::min(2 / threshold, kSteepest) : kSteepest));
+  gl_.Uniform1f(program_.uniform("reliability_ratio"), static_cast<float>(reliability_ratio));
+  gl_.BindVertexArray(no_vertices_.name());
+  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+
+  Frame frame;
+  frame.color.create(height_, width_);
+  frame.depth.create(height_, width_);
+  gl_.PixelStorei(GL_PACK_ALIGNMENT, 1);
+  gl_.ReadBuffer(GL_COLOR_ATTACHMENT0);
+  gl_.ReadPixels(0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, frame.color.data);
+  gl_.ReadBuffer(GL_COLOR_ATTACHMENT1);
+  gl_.ReadPixels(0, 0, width_, height_, GL_RED, GL_FLOAT, frame.depth.data);
+  check_gl(gl_, "composing the views");
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      if (frame.color(y, x)[3] == 0) frame.depth(y, x) = kMissing;
+    }
+  }
+  return frame;
+}
+
+}  // namespace scanview

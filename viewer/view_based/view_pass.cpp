@@ -1,0 +1,220 @@
+#include "viewer/view_based/view_pass.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "base/error.h"
+#include "viewer/view_based/padded_texture.h"
+
+namespace scanview {
+namespace {
+
+using Eigen::Matrix4d;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+
+constexpr char kVertexShader[] = R"(#version 330 core
+layout(location = 0) in vec3 p_source;
+uniform mat4 clip_from_source;
+uniform mat4 sample_from_source;   // rows: s w, t w, w (texture coordinates), depth in the rendering camera
+out vec4 texture_and_depth;
+void main() {
+  gl_Position = clip_from_source * vec4(p_source, 1.0);
+  texture_and_depth = sample_from_source * vec4(p_source, 1.0);
+}
+)";
+
+constexpr char kFragmentShader[] = R"(#version 330 core
+in vec4 texture_and_depth;
+uniform sampler2D picture;
+uniform sampler2D feather;
+uniform samplerBuffer cos_phi;
+uniform vec3 gain;
+uniform float least_weight;
+layout(location = 0) out vec4 color_and_weight;
+layout(location = 1) out float depth;
+void main() {
+  vec2 st = texture_and_depth.xy / texture_and_depth.z;
+  float weight = texelFetch(cos_phi, gl_PrimitiveID).r * texture(feather, st).r;
+  color_and_weight = vec4(gain * texture(picture, st).rgb, clamp(weight, least_weight, 1.0));
+  depth = texture_and_depth.w;
+}
+)";
+
+/// Rows of the homogeneous texture coordinates (s w, t w, w) of a point in camera coordinates: the centre of the
+/// top-left pixel is at half a texel.
+Eigen::Matrix<double, 3, 4> texture_from_camera(Camera const& camera) {
+  double const w = camera.width(), h = camera.height();
+  Eigen::Matrix<double, 3, 4> m = Eigen::Matrix<double, 3, 4>::Zero();
+  int const scale = camera.is_perspective() ? 2 : 3;  // multiplies z, or 1
+  m(0, 0) = camera.fx() / w;
+  m(0, scale) = (camera.cx() + 0.5) / w;
+  m(1, 1) = camera.fy() / h;
+  m(1, scale) = (camera.cy() + 0.5) / h;
+  m(2, scale) = 1;
+  return m;
+}
+
+struct DepthRange {
+  double near = 0, far = 0;
+};
+
+/// Of the view's bounds in the rendering camera; false where all of it is behind a perspective camera.
+bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& camera_from_source, bool perspective,
+                 DepthRange& range) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (int i = 0; i < 8; ++i) {
+    double const z = (camera_from_source * bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i))).z();
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  double const margin = 1e-3 * std::max(high - low, 1e-3 * std::max(std::abs(low), std::abs(high))) + 1e-30;
+  range.near = low - margin;
+  range.far = high + margin;
+  if (!perspective) return true;
+  // Nothing nearer than this share of the furthest depth is drawn: it would be magnified beyond any meaning.
+  constexpr double kNearest = 1e-4;
+  range.near = std::max(range.near, kNearest * range.far);
+  return high > 0;
+}
+
+/// OpenGL's clip coordinates of a point in camera coordinates. The picture's top row is OpenGL's row 0, so that pixels
+/// lie in memory as they should; that mirrors the winding.
+Matrix4d clip_from_camera(Camera const& camera, DepthRange const& range) {
+  Eigen::Matrix<double, 3, 4> const texture = texture_from_camera(camera);
+  Matrix4d clip = Matrix4d::Zero();
+  clip.row(0) = 2 * texture.row(0) - texture.row(2);
+  clip.row(1) = 2 * texture.row(1) - texture.row(2);
+  clip.row(3) = texture.row(2);
+  double const length = range.far - range.near;
+  if (camera.is_perspective()) {
+    clip.row(2) << 0, 0, (range.far + range.near) / length, -2 * range.far * range.near / length;
+  } else {
+    clip.row(2) << 0, 0, 2 / length, -(range.far + range.near) / length;
+  }
+  return clip;
+}
+
+void upload_buffer(GlFunctions const& gl, GLenum target, GlBuffer const& buffer, std::size_t bytes, void const* data) {
+  gl.BindBuffer(target, buffer.name());
+  gl.BufferData(target, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
+}
+
+void clamp_to_edge(GlFunctions const& gl) {
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+}
+
+void check_view_mesh(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh) {
+  auto const refuse = [&](std::string const& why) {
+    throw Error(ErrorCode::bad_input, {}, "view " + view.name + ": " + why);
+  };
+  if (view_mesh.cos_phi.size() != view_mesh.mesh.triangles.size()) refuse("a mesh without one cosine a triangle");
+  if (view_mesh.mesh.triangles.size() > static_cast<std::size_t>(gl.max_texture_buffer_size)) {
+    refuse(fmt::format("{} triangles are more than OpenGL can hold here ({})", view_mesh.mesh.triangles.size(),
+                       gl.max_texture_buffer_size));
+  }
+  if (std::max(view_mesh.camera.width(), view_mesh.camera.height()) > gl.max_texture_size) {
+    refuse(fmt::format("a picture of {} x {} is more than OpenGL can hold here ({})", view_mesh.camera.width(),
+                       view_mesh.camera.height(), gl.max_texture_size));
+  }
+}
+
+}  // namespace
+
+GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh)
+    : camera_(view_mesh.camera),
+      object_from_camera_(*view.object_from_camera),
+      gain_(view.gain.cast<float>()),
+      index_count_(static_cast<GLsizei>(3 * view_mesh.mesh.triangles.size())) {
+  if (empty()) return;
+  check_view_mesh(gl, view, view_mesh);
+  view_mesh.mesh.check();
+  for (auto const& vertex : view_mesh.mesh.vertices) bounds_.extend(vertex.cast<double>());
+
+  vertex_array_ = GlVertexArray(gl);
+  gl.BindVertexArray(vertex_array_.name());
+  vertices_ = GlBuffer(gl);
+  upload_buffer(gl, GL_ARRAY_BUFFER, vertices_, view_mesh.mesh.vertices.size() * sizeof(Eigen::Vector3f),
+                view_mesh.mesh.vertices.data());
+  gl.EnableVertexAttribArray(0);
+  gl.VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(Eigen::Vector3f), nullptr);
+  indices_ = GlBuffer(gl);
+  upload_buffer(gl, GL_ELEMENT_ARRAY_BUFFER, indices_, view_mesh.mesh.triangles.size() * sizeof(Eigen::Vector3i),
+                view_mesh.mesh.triangles.data());
+  gl.BindVertexArray(0);
+
+  cos_phi_ = GlBuffer(gl);
+  upload_buffer(gl, GL_TEXTURE_BUFFER, cos_phi_, view_mesh.cos_phi.size() * sizeof(float), view_mesh.cos_phi.data());
+  cos_phi_texture_ = GlTexture(gl);
+  gl.BindTexture(GL_TEXTURE_BUFFER, cos_phi_texture_.name());
+  gl.TexBuffer(GL_TEXTURE_BUFFER, GL_R32F, cos_phi_.name());
+
+  cv::Mat3b const picture = padded_texture(view.image, view_mesh);
+  gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  picture_ = GlTexture(gl);
+  gl.BindTexture(GL_TEXTURE_2D, picture_.name());
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8_ALPHA8, picture.cols, picture.rows, 0, GL_BGR, GL_UNSIGNED_BYTE,
+                picture.data);
+  gl.GenerateMipmap(GL_TEXTURE_2D);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  clamp_to_edge(gl);
+
+  cv::Mat1b const feather = view_mesh.feather.isContinuous() ? view_mesh.feather : cv::Mat1b(view_mesh.feather.clone());
+  feather_ = GlTexture(gl);
+  gl.BindTexture(GL_TEXTURE_2D, feather_.name());
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_R8, feather.cols, feather.rows, 0, GL_RED, GL_UNSIGNED_BYTE, feather.data);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  clamp_to_edge(gl);
+  check_gl(gl, ("the mesh and picture of view " + view.name).c_str());
+}
+
+ViewPass::ViewPass(GlFunctions const& gl) : gl_(gl), program_(gl, kVertexShader, kFragmentShader) {}
+
+bool ViewPass::in_front(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera) {
+  DepthRange range;
+  return depth_range(view.bounds_, object_from_camera.inverse() * view.object_from_camera_, camera.is_perspective(),
+                     range);
+}
+
+bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera) const {
+  // In double precision: the two poses may be far from the origin, their difference is not.
+  Eigen::Isometry3d const camera_from_source = object_from_camera.inverse() * view.object_from_camera_;
+  DepthRange range;
+  if (!depth_range(view.bounds_, camera_from_source, camera.is_perspective(), range)) return false;
+  Eigen::Matrix4f const clip_from_source =
+      (clip_from_camera(camera, range) * camera_from_source.matrix()).cast<float>();
+  Matrix4d sample_from_source;
+  sample_from_source << texture_from_camera(view.camera_), camera_from_source.matrix().row(2);
+  Eigen::Matrix4f const samples = sample_from_source.cast<float>();
+
+  gl_.Enable(GL_DEPTH_TEST);
+  gl_.DepthFunc(GL_LESS);
+  gl_.Enable(GL_CULL_FACE);
+  gl_.CullFace(GL_BACK);
+  // Triangles are counter-clockwise seen from the source camera with y up; here y runs down (see clip_from_camera).
+  gl_.FrontFace(GL_CW);
+  program_.use();
+  gl_.UniformMatrix4fv(program_.uniform("clip_from_source"), 1, GL_FALSE, clip_from_source.data());
+  gl_.UniformMatrix4fv(program_.uniform("sample_from_source"), 1, GL_FALSE, samples.data());
+  gl_.Uniform3f(program_.uniform("gain"), view.gain_.x(), view.gain_.y(), view.gain_.z());
+  gl_.Uniform1f(program_.uniform("least_weight"), kLeastPixelWeight);
+  gl_.ActiveTexture(GL_TEXTURE0);
+  gl_.BindTexture(GL_TEXTURE_2D, view.picture_.name());
+  gl_.ActiveTexture(GL_TEXTURE1);
+  gl_.BindTexture(GL_TEXTURE_2D, view.feather_.name());
+  gl_.ActiveTexture(GL_TEXTURE2);
+  gl_.BindTexture(GL_TEXTURE_BUFFER, view.cos_phi_texture_.name());
+  gl_.Uniform1i(program_.uniform("picture"), 0);
+  gl_.Uniform1i(program_.uniform("feather"), 1);
+  gl_.Uniform1i(program_.uniform("cos_phi"), 2);
+  gl_.BindVertexArray(view.vertex_array_.name());
+  gl_.DrawElements(GL_TRIANGLES, view.index_count_, GL_UNSIGNED_INT, nullptr);
+  return true;
+}
+
+}  // namespace scanview
