@@ -62,8 +62,10 @@ struct Axis {
   std::vector<double> ticks() const {  // placed
     std::vector<double> result;
     double const step = log ? std::max(1.0, std::ceil((high - low) / 6)) : tick_step(high - low);
-    for (double i = std::ceil(low / step); i <= std::floor(high / step) && result.size() < 20; ++i)
-      result.push_back(i * step);
+    for (double i = std::ceil(low / step); i <= std::floor(high / step) && result.size() < 20; ++i) {
+      double const value = log ? std::pow(10, i * step) : i * step;
+      if (std::isfinite(value)) result.push_back(i * step);
+    }
     return result;
   }
   std::string label(double placed) const {

@@ -33,7 +33,7 @@ struct PlotCurve {
   bool dots = false;
 };
 struct PlotOptions {
-  std::string x_label, y_label;
+  std::string x_label = "", y_label = "";
   bool log_x = false, log_y = false;
   bool equal_scale = false;  ///< one unit is as long on both axes (cross-sections)
   int width = 480, height = 320;

@@ -1,8 +1,10 @@
 #include "base/parallel.h"
 
+#include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <algorithm>
 #include <exception>
 #include <vector>
 
@@ -22,7 +24,9 @@ void for_each_index(Context& context, std::size_t count, std::function<void(std:
       errors[i] = std::current_exception();
     }
   };
-  int const threads = context.threads > 0 ? context.threads : oneapi::tbb::task_arena::automatic;
+  // More threads than processors gain nothing, and oneTBB would print a warning about them.
+  int const processors = oneapi::tbb::info::default_concurrency();
+  int const threads = context.threads > 0 ? std::min(context.threads, processors) : processors;
   oneapi::tbb::task_arena arena(threads);
   arena.execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, one, oneapi::tbb::simple_partitioner()); });
   for (auto const& error : errors)

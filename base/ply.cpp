@@ -80,10 +80,10 @@ class Body {
   std::size_t left() const { return bytes_.size(); }
 
   /// The next value, or nothing where the bytes end or are no number of this type.
-  std::optional<double> next(PlyType type) { return format_ == PlyFormat::ascii ? next_text() : next_binary(type); }
+  std::optional<double> next(PlyType type) { return format_ == PlyFormat::ascii ? next_text(type) : next_binary(type); }
 
  private:
-  std::optional<double> next_text() {
+  std::optional<double> next_text(PlyType type) {
     auto const begin = bytes_.find_first_not_of(" \t\r\n");
     if (begin == std::string_view::npos) return {};
     bytes_.remove_prefix(begin);
@@ -92,7 +92,7 @@ class Body {
     auto const [end, error] = std::from_chars(bytes_.data(), bytes_.data() + bytes_.size(), value);
     if (error != std::errc()) return {};
     bytes_.remove_prefix(static_cast<std::size_t>(end - bytes_.data()));
-    return value;
+    return type == PlyType::float32 ? static_cast<float>(value) : value;
   }
 
   template <typename T>

@@ -1,0 +1,61 @@
+#include "base/image_file.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "base/files.h"
+#include "tests/expect_error.h"
+#include "tests/temporary_folder.h"
+
+namespace scanview {
+namespace {
+
+cv::Mat gradient(int type) {
+  cv::Mat image(37, 53, type);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols * image.channels(); ++x)
+      if (image.depth() == CV_8U)
+        image.ptr<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(x * 7 + y * 13);
+      else
+        image.ptr<std::uint16_t>(y)[x] = static_cast<std::uint16_t>(x * 1009 + y * 773);
+  return image;
+}
+
+TEST(ImageFile, PngKeepsEveryPixel) {
+  TemporaryFolder folder;
+  for (int const type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1}) {
+    cv::Mat const image = gradient(type);
+    write_file(folder.path() / "i.png", encode_png(image));
+    cv::Mat const back = read_image(folder.path() / "i.png");
+    ASSERT_EQ(back.type(), type);
+    EXPECT_EQ(cv::norm(back, image, cv::NORM_INF), 0);
+  }
+}
+
+TEST(ImageFile, ColorOfAnyPicture) {
+  TemporaryFolder folder;
+  write_file(folder.path() / "gray16.png", encode_png(cv::Mat(4, 5, CV_16UC1, cv::Scalar(257 * 100))));
+  cv::Mat3b const color = read_color(folder.path() / "gray16.png");
+  EXPECT_EQ(color.size(), cv::Size(5, 4));
+  EXPECT_EQ(color(2, 2), cv::Vec3b(100, 100, 100));
+}
+
+TEST(ImageFile, EveryTruncatedPictureIsRefused) {
+  TemporaryFolder folder;
+  for (std::string const& bytes :
+       {encode_png(gradient(CV_8UC3)), encode_png(gradient(CV_16UC1)), encode_jpeg(gradient(CV_8UC3))})
+    for (std::size_t n = 0; n + 2 < bytes.size(); n += std::max<std::size_t>(1, bytes.size() / 50)) {
+      write_file(folder.path() / "cut", bytes.substr(0, n));
+      EXPECT_SCANVIEW_ERROR(read_image(folder.path() / "cut"), ErrorCode::bad_input, "cut");
+    }
+}
+
+TEST(ImageFile, WhatIsNoPictureIsRefused) {
+  TemporaryFolder folder;
+  write_file(folder.path() / "text.png", "hello");
+  EXPECT_SCANVIEW_ERROR(read_image(folder.path() / "text.png"), ErrorCode::bad_input, "not a picture");
+}
+
+}  // namespace
+}  // namespace scanview
