@@ -1,9 +1,8 @@
 #pragma once
-#include <filesystem>
-#include <vector>
-
 #include <Eigen/Core>
+#include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <vector>
 
 namespace scanview {
 
@@ -19,7 +18,8 @@ struct TriangleMesh {
 };
 
 /// PLY (any format; polygons are fanned, tristrips unrolled) or OBJ (positions, faces, vertex colours), by the file's
-/// ending, also gzipped (.ply.gz, .obj.gz). Throws Error{bad_input}; indices out of range and non-finite vertices are errors.
+/// ending, also gzipped (.ply.gz, .obj.gz). Throws Error{bad_input}; indices out of range and non-finite vertices are
+/// errors.
 TriangleMesh read_triangle_mesh(std::filesystem::path const& path);
 /// Binary little-endian PLY; whole or not at all.
 void write_triangle_mesh(std::filesystem::path const& path, TriangleMesh const& mesh);

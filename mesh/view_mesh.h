@@ -1,13 +1,12 @@
 #pragma once
 #include <filesystem>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include <opencv2/core/mat.hpp>
-
+#include "acquire/scan_set.h"
 #include "base/context.h"
 #include "base/html.h"
 #include "calib/camera.h"
-#include "acquire/scan_set.h"
 #include "mesh/triangle_mesh.h"
 
 namespace scanview {
@@ -18,32 +17,35 @@ namespace scanview {
 struct ViewMesh {
   Camera camera;
   TriangleMesh mesh;
-  std::vector<float> cos_phi;   ///< a triangle: cosine between its normal and the ray to the source camera (Pulli 1997)
-  cv::Mat1b feather;            ///< a pixel of the camera: 0 outside the mesh, rising linearly to 255 with the distance
-                                ///< in pixels from its boundary
+  std::vector<float> cos_phi;  ///< a triangle: cosine between its normal and the ray to the source camera (Pulli 1997)
+  cv::Mat1b feather;           ///< a pixel of the camera: 0 outside the mesh, rising linearly to 255 with the distance
+                               ///< in pixels from its boundary
+  /// Throws std::logic_error where the parts do not belong together (counts, indices, sizes).
+  void check() const;
 };
 
 struct MeshOptions {
   enum class Tolerance { units, sigmas, automatic } tolerance_kind = Tolerance::automatic;
-  double tolerance = 3.0;          ///< greatest distance in depth, in units or in multiples of each pixel's sigma
-  int max_triangles = 0;           ///< a view; 0: as many as the tolerance needs
-  double step_sigmas = 6.0;        ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
-  double max_angle_deg = 80.0;     ///< triangles that are seen more grazingly are dropped
-  int feather_px = 16;             ///< distance from the boundary at which the feather weight is full
+  double tolerance = 3.0;       ///< greatest distance in depth, in units or in multiples of each pixel's sigma
+  int max_triangles = 0;        ///< a view; 0: as many as the tolerance needs
+  double step_sigmas = 6.0;     ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
+  double max_angle_deg = 80.0;  ///< triangles that are seen more grazingly are dropped
+  int feather_px = 16;          ///< distance from the boundary at which the feather weight is full
+  int min_patch_pixels = 4;     ///< smaller groups of pixels on one surface are not meshed: they count as uncovered
   void validate() const;
 };
 
 /// Depth error of a mesh over the pixels of its range image: along the ray, at pixels the mesh covers.
 struct MeshFigures {
   std::size_t triangles = 0;
-  double rms = 0, p95 = 0, max = 0;   ///< units
-  double uncovered = 0;                ///< share of object pixels that no triangle covers
+  double rms = 0, p95 = 0, max = 0;  ///< units
+  double uncovered = 0;              ///< share of object pixels that no triangle covers
 };
 
 struct ViewMeshResult {
   ViewMesh view_mesh;
   MeshFigures figures;
-  double tolerance = 0;                ///< used: in units (units), or multiples of sigma
+  double tolerance = 0;  ///< used: in units (units), or multiples of sigma
 };
 
 /// Meshes one range image: outline and step edges as constraints, greedy insertion of the worst pixel (Garland and
@@ -55,8 +57,8 @@ ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& opti
 void write_view_mesh(std::filesystem::path const& view_folder, ViewMesh const& view_mesh);
 ViewMesh read_view_mesh(std::filesystem::path const& view_folder, Camera const& camera);
 
-/// GLB for other programs (DESIGN §3): y up, z backward by a node transform that also holds the unit; plain (s, t), with
-/// triangles split where that would be off by more than half a texel. Embeds the colour picture.
+/// GLB for other programs (DESIGN §3): y up, z backward by a node transform that also holds the unit; plain (s, t),
+/// with triangles split where that would be off by more than half a texel. Embeds the colour picture.
 std::string encode_glb(std::vector<ViewMesh const*> const& meshes, ScanSet const& set,
                        std::vector<std::size_t> const& view_indices);
 

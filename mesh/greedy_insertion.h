@@ -1,0 +1,30 @@
+#pragma once
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "base/context.h"
+#include "mesh/outline.h"
+#include "mesh/surface_links.h"
+#include "mesh/triangle_mesh.h"
+
+namespace scanview {
+
+/// Triangulates a range image by greedy insertion (Garland and Heckbert 1995, algorithm III): a constrained Delaunay
+/// triangulation (CGAL, exact predicates) whose constraints are `outline`; of all pixels the one that is worst off, by
+/// error over `tolerance` (depth, a pixel, positive), becomes a vertex, only the triangles around it are looked at
+/// again, and so on until every pixel of `links.object` is within its tolerance, or the next vertex would make more
+/// than `max_triangles` (0: no limit; the outline alone may need more).
+///
+/// Where the worst pixel lies beside the outline, the outline gets a vertex instead, near that pixel, so that the
+/// border's depths are followed as well. A vertex in the picture takes the depth of a plane through the linked pixels
+/// around where the pixels agree with a plane to their sigma, but moves by no more than half the tolerance; else the
+/// pixel's own depth. A vertex on the outline is extended by the slope of its side, at most as far as the neighbouring
+/// depths differ, one vertex for each side of a step.
+///
+/// Depths are checked on the vertices as they are returned, in single precision: afterwards the error at every pixel
+/// that is not itself a vertex is within tolerance, unless the limit was reached. Coordinates are the camera's;
+/// triangles have their normal (b − a) × (c − a) towards the camera. About n log n for n pixels.
+TriangleMesh triangulate_by_greedy_insertion(RangeImage const& image, SurfaceLinks const& links, Outline const& outline,
+                                             cv::Mat1f const& tolerance, int max_triangles, Context& context);
+
+}  // namespace scanview

@@ -1,0 +1,220 @@
+#include "mesh/outline.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+namespace scanview {
+namespace {
+
+double cross(Eigen::Vector2d const& a, Eigen::Vector2d const& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// The graph whose vertices are the corners of pixels, (i, j) at (i − ½, j − ½), and whose edges ("cracks") are the
+/// sides between pixels that are not on one surface.
+class CrackGraph {
+ public:
+  explicit CrackGraph(SurfaceLinks const& links)
+      : links_(links),
+        width_(links.object.cols),
+        height_(links.object.rows),
+        horizontal_(cv::Mat1b::zeros(height_ + 1, width_ + 1)),
+        vertical_(cv::Mat1b::zeros(height_ + 1, width_ + 1)) {
+    for (int j = 0; j <= height_; ++j)
+      for (int i = 0; i <= width_; ++i) {
+        if (i < width_) horizontal_(j, i) = parts({i, j - 1}, {i, j});
+        if (j < height_) vertical_(j, i) = parts({i - 1, j}, {i, j});
+      }
+  }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  /// Directions 0..3: +x, +y, −x, −y.
+  static Eigen::Vector2i step(int direction) {
+    static Eigen::Vector2i const steps[4] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+    return steps[direction];
+  }
+  bool has(Eigen::Vector2i corner, int direction) const {
+    uchar const* const at = crack(corner, direction);
+    return at && *at;
+  }
+  void erase(Eigen::Vector2i corner, int direction) { *const_cast<uchar*>(crack(corner, direction)) = 0; }
+  int degree(Eigen::Vector2i corner) const {
+    int count = 0;
+    for (int direction = 0; direction < 4; ++direction) count += has(corner, direction);
+    return count;
+  }
+  /// The pixels beside the crack that leads from `corner` in `direction`.
+  static Gate gate(Eigen::Vector2i corner, int direction) {
+    int const i = corner.x(), j = corner.y();
+    switch (direction) {
+      case 0:
+        return {{i, j}, {i, j - 1}};
+      case 1:
+        return {{i - 1, j}, {i, j}};
+      case 2:
+        return {{i - 1, j - 1}, {i - 1, j}};
+      default:
+        return {{i, j - 1}, {i - 1, j - 1}};
+    }
+  }
+
+ private:
+  bool parts(Eigen::Vector2i a, Eigen::Vector2i b) const {
+    bool const in_a = links_.is_object(a.x(), a.y()), in_b = links_.is_object(b.x(), b.y());
+    return in_a != in_b || (in_a && !links_.linked(a.x(), a.y(), b.x(), b.y()));
+  }
+  uchar const* crack(Eigen::Vector2i corner, int direction) const {
+    int const i = corner.x() - (direction == 2), j = corner.y() - (direction == 3);
+    if (i < 0 || j < 0) return nullptr;
+    return direction % 2 == 0 ? &horizontal_(j, i) : &vertical_(j, i);
+  }
+
+  SurfaceLinks const& links_;
+  int width_, height_;
+  cv::Mat1b horizontal_, vertical_;
+};
+
+/// Cracks from corner to corner: from one corner where not exactly two meet to the next, or all around.
+struct Chain {
+  std::vector<Eigen::Vector2i> corners;  ///< one more than gates
+  std::vector<Gate> gates;
+  bool closed() const { return corners.front() == corners.back(); }
+};
+
+Chain follow(CrackGraph& graph, cv::Mat1b const& is_node, Eigen::Vector2i corner, int direction) {
+  Chain chain;
+  chain.corners.push_back(corner);
+  while (true) {
+    chain.gates.push_back(CrackGraph::gate(corner, direction));
+    graph.erase(corner, direction);
+    corner += CrackGraph::step(direction);
+    chain.corners.push_back(corner);
+    if (is_node(corner.y(), corner.x())) return chain;
+    int next = 0;
+    while (next < 4 && !graph.has(corner, next)) ++next;
+    if (next == 4) return chain;  // back where a loop began
+    direction = next;
+  }
+}
+
+std::vector<Chain> find_chains(CrackGraph graph) {
+  cv::Mat1b is_node(graph.height() + 1, graph.width() + 1);
+  for (int j = 0; j <= graph.height(); ++j)
+    for (int i = 0; i <= graph.width(); ++i) is_node(j, i) = graph.degree({i, j}) != 2;
+  std::vector<Chain> chains;
+  for (int nodes_first = 1; nodes_first >= 0; --nodes_first)
+    for (int j = 0; j <= graph.height(); ++j)
+      for (int i = 0; i <= graph.width(); ++i)
+        for (int direction = 0; direction < 4; ++direction)
+          if (is_node(j, i) == nodes_first && graph.has({i, j}, direction))
+            chains.push_back(follow(graph, is_node, {i, j}, direction));
+  return chains;
+}
+
+/// How near to a pixel's centre, in parts of the distance to its neighbour, a segment may pass.
+constexpr double kMargin = 0.1;
+
+/// Positions along a chain where a segment may end: corners (even) and middles of sides (odd).
+class ChainSimplifier {
+ public:
+  /// `free_loop`: a closed chain without a node on it, which may begin anywhere.
+  ChainSimplifier(Chain const& chain, bool free_loop)
+      : chain_(chain), count_(int(chain.gates.size())), free_loop_(free_loop) {}
+
+  /// Positions of the polyline's vertices, the first and the last included; in a closed chain the last is the first
+  /// plus twice the number of gates.
+  std::vector<int> run() const {
+    std::vector<int> const best = from(0);
+    if (!free_loop_) return best;
+    std::vector<int> const other = from(best[1]);
+    return other.size() < best.size() ? other : best;
+  }
+
+  Eigen::Vector2d position(int at) const {
+    if (at % 2 == 1) return (gate(at / 2).left + gate(at / 2).right).cast<double>() / 2;
+    int const corner = at / 2 <= count_ ? at / 2 : at / 2 - count_;
+    return chain_.corners[corner].cast<double>() - Eigen::Vector2d(0.5, 0.5);
+  }
+  Gate const& gate(int index) const { return chain_.gates[index % count_]; }
+
+ private:
+  std::vector<int> from(int start) const {
+    std::vector<int> result = {start};
+    int const end = start + 2 * count_;
+    while (result.back() < end) result.push_back(farthest(result.back(), end));
+    return result;
+  }
+
+  /// The last position up to `end` that a straight line reaches through all gates between.
+  int farthest(int start, int end) const {
+    Eigen::Vector2d const origin = position(start);
+    Eigen::Vector2d left, right;  // of the cone of lines that pass all gates so far
+    bool open = true;
+    int reached = start + 1;
+    auto in_cone = [&](Eigen::Vector2d const& v) { return open || (cross(right, v) >= 0 && cross(v, left) >= 0); };
+    for (int index = (start + 1) / 2;; ++index) {
+      int const corner = 2 * index, middle = corner + 1;
+      if (corner > start && corner <= end && in_cone(position(corner) - origin)) reached = corner;
+      if (corner >= end) return reached;
+      if (middle > start && middle <= end && in_cone(position(middle) - origin)) reached = middle;
+      if (middle >= end) return reached;
+      Eigen::Vector2d const l = gate(index).left.cast<double>(), r = gate(index).right.cast<double>();
+      Eigen::Vector2d const to_left = l + kMargin * (r - l) - origin, to_right = r + kMargin * (l - r) - origin;
+      if (open) {
+        left = to_left;
+        right = to_right;
+        open = false;
+      } else {
+        if (cross(left, to_right) > 0 || cross(to_left, right) > 0) return reached;
+        if (cross(to_left, left) > 0) left = to_left;
+        if (cross(right, to_right) > 0) right = to_right;
+      }
+      if (cross(right, left) <= 0) return reached;
+    }
+  }
+
+  Chain const& chain_;
+  int count_;
+  bool free_loop_;
+};
+
+}  // namespace
+
+Outline trace_outline(SurfaceLinks const& links) {
+  Outline outline;
+  CrackGraph const graph(links);
+  std::map<std::pair<int, int>, int> vertex_of_place;  // doubled coordinates
+  auto vertex = [&](Eigen::Vector2d const& position) {
+    int const x2 = int(2 * position.x()), y2 = int(2 * position.y());
+    auto [it, is_new] = vertex_of_place.try_emplace({y2, x2}, int(outline.vertices.size()));
+    if (is_new) {
+      OutlineVertex added{position, {}};
+      // floor and ceil of x2/2 are the columns beside it: the same one where the coordinate is whole.
+      for (int y : {y2 >> 1, (y2 + 1) >> 1})
+        for (int x : {x2 >> 1, (x2 + 1) >> 1}) {
+          Eigen::Vector2i const pixel(x, y);
+          bool const inside = x >= 0 && y >= 0 && x < links.object.cols && y < links.object.rows;
+          if (inside && std::find(added.pixels.begin(), added.pixels.end(), pixel) == added.pixels.end())
+            added.pixels.push_back(pixel);
+        }
+      outline.vertices.push_back(added);
+    }
+    return it->second;
+  };
+  for (Chain const& chain : find_chains(graph)) {
+    ChainSimplifier const simplifier(chain, chain.closed() && graph.degree(chain.corners.front()) == 2);
+    std::vector<int> const positions = simplifier.run();
+    for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
+      OutlineSegment segment;
+      segment.from = vertex(simplifier.position(positions[k]));
+      segment.to = vertex(simplifier.position(positions[k + 1]));
+      for (int index = positions[k] / 2; index <= (positions[k + 1] - 1) / 2; ++index)
+        segment.gates.push_back(simplifier.gate(index));
+      outline.segments.push_back(std::move(segment));
+    }
+  }
+  return outline;
+}
+
+}  // namespace scanview

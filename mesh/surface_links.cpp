@@ -1,0 +1,147 @@
+#include "mesh/surface_links.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace scanview {
+namespace {
+
+class StepTest {
+ public:
+  StepTest(RangeImage const& image, double step_sigmas) : image_(image), step_sigmas_(step_sigmas) {}
+
+  /// Pixel (x, y) and the next one in direction (dx, dy), both with depths.
+  bool is_step(int x, int y, int dx, int dy) const {
+    double const za = image_.depth(y, x), zb = image_.depth(y + dy, x + dx);
+    double const jump = std::abs(zb - za);
+    double const sigma = std::hypot(double(image_.sigma(y, x)), double(image_.sigma(y + dy, x + dx)));
+    Camera const& camera = image_.camera;
+    double const noise = step_sigmas_ * sigma;
+    double const width = camera.is_perspective() ? std::min(za, zb) / std::max(camera.fx(), camera.fy())
+                                                 : 1.0 / std::max(camera.fx(), camera.fy());
+    if (jump <= noise + width) return false;
+
+    // Predicted jump, from either side; where a side is too short to have a slope the other alone decides.
+    double const from_a = predicted_jump(x, y, -dx, -dy, za), from_b = -predicted_jump(x + dx, y + dy, dx, dy, zb);
+    double const sign = zb > za ? 1 : -1;
+    double slope = 0;
+    if (std::isnan(from_a))
+      slope = std::isnan(from_b) ? 0 : sign * from_b;
+    else
+      slope = std::isnan(from_b) ? sign * from_a : std::min(sign * from_a, sign * from_b);
+    return jump > noise + std::max(width, 2 * slope);
+  }
+
+ private:
+  /// The surface that starts at (x, y) and goes on in direction (dx, dy): how much deeper than z it would be one pixel
+  /// before (x, y). NaN where there is but one pixel.
+  double predicted_jump(int x, int y, int dx, int dy, double z) const {
+    double const q0 = linear_depth(image_.camera, z);
+    if (!has_depth(x + dx, y + dy)) return std::numeric_limits<double>::quiet_NaN();
+    double const q1 = linear_depth(image_.camera, image_.depth(y + dy, x + dx));
+    double slope = q0 - q1;
+    if (has_depth(x + 2 * dx, y + 2 * dy))
+      slope = (q0 - linear_depth(image_.camera, image_.depth(y + 2 * dy, x + 2 * dx))) / 2;
+    double const q = q0 + slope;
+    if (image_.camera.is_perspective() && q <= 0) return std::numeric_limits<double>::infinity();
+    return linear_depth(image_.camera, q) - z;
+  }
+
+  bool has_depth(int x, int y) const {
+    return x >= 0 && y >= 0 && x < image_.depth.cols && y < image_.depth.rows && image_.has_depth(x, y);
+  }
+
+  RangeImage const& image_;
+  double step_sigmas_;
+};
+
+/// Union-find over pixels, the smallest index being the root.
+class Patches {
+ public:
+  explicit Patches(std::size_t count) : parent_(count) {
+    for (std::size_t i = 0; i < count; ++i) parent_[i] = int(i);
+  }
+  int root(int i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(int a, int b) {
+    a = root(a);
+    b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<int> parent_;
+};
+
+/// Whether the sides between the four pixels around the corner at (x − ½, y − ½) separate pixels.
+int cracks_at_corner(SurfaceLinks const& links, int x, int y) {
+  auto crack = [&](int x0, int y0, int x1, int y1) {
+    bool const a = links.is_object(x0, y0), b = links.is_object(x1, y1);
+    return a != b || (a && !links.linked(x0, y0, x1, y1));
+  };
+  return crack(x - 1, y - 1, x, y - 1) + crack(x - 1, y, x, y) + crack(x - 1, y - 1, x - 1, y) + crack(x, y - 1, x, y);
+}
+
+/// A single missing link between pixels that are linked all around says that the evidence is at the limit: no step.
+void heal_single_cracks(SurfaceLinks& links) {
+  cv::Mat1b const object = links.object;
+  std::vector<cv::Point> right, down;
+  for (int y = 0; y < object.rows; ++y)
+    for (int x = 0; x < object.cols; ++x) {
+      if (!object(y, x)) continue;
+      if (links.is_object(x + 1, y) && !links.right(y, x) && cracks_at_corner(links, x + 1, y) == 1 &&
+          cracks_at_corner(links, x + 1, y + 1) == 1)
+        right.emplace_back(x, y);
+      if (links.is_object(x, y + 1) && !links.down(y, x) && cracks_at_corner(links, x, y + 1) == 1 &&
+          cracks_at_corner(links, x + 1, y + 1) == 1)
+        down.emplace_back(x, y);
+    }
+  for (cv::Point const& p : right) links.right(p) = 1;
+  for (cv::Point const& p : down) links.down(p) = 1;
+}
+
+void drop_small_patches(SurfaceLinks& links, int min_patch_pixels) {
+  int const width = links.object.cols, height = links.object.rows;
+  Patches patches(std::size_t(width) * height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      if (links.right(y, x)) patches.join(y * width + x, y * width + x + 1);
+      if (links.down(y, x)) patches.join(y * width + x, (y + 1) * width + x);
+    }
+  std::vector<int> size(std::size_t(width) * height, 0);
+  for (int i = 0; i < width * height; ++i) ++size[patches.root(i)];
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      if (links.object(y, x) && size[patches.root(y * width + x)] < min_patch_pixels) {
+        // Its links lead only to pixels of the same patch, which go as well.
+        links.object(y, x) = links.right(y, x) = links.down(y, x) = 0;
+        ++links.dropped;
+      }
+}
+
+}  // namespace
+
+SurfaceLinks find_surface_links(RangeImage const& image, double step_sigmas, int min_patch_pixels) {
+  int const width = image.camera.width(), height = image.camera.height();
+  SurfaceLinks links;
+  links.object = cv::Mat1b::zeros(height, width);
+  links.right = cv::Mat1b::zeros(height, width);
+  links.down = cv::Mat1b::zeros(height, width);
+  StepTest const test(image, step_sigmas);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      if (!image.has_depth(x, y)) continue;
+      links.object(y, x) = 1;
+      if (x + 1 < width && image.has_depth(x + 1, y)) links.right(y, x) = !test.is_step(x, y, 1, 0);
+      if (y + 1 < height && image.has_depth(x, y + 1)) links.down(y, x) = !test.is_step(x, y, 0, 1);
+    }
+  heal_single_cracks(links);
+  drop_small_patches(links, min_patch_pixels);
+  return links;
+}
+
+}  // namespace scanview
