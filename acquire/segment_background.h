@@ -1,0 +1,31 @@
+#pragma once
+#include <vector>
+
+#include "acquire/scan_set.h"
+#include "base/context.h"
+
+namespace scanview {
+
+/// What a fixed camera would see without the object, from views between which only the object moved.
+struct BackgroundModel {
+  cv::Mat1f depth;          ///< in units; NaN where nothing is known
+  cv::Mat1f sigma;          ///< of `depth`, larger where it had to be bridged from the surroundings
+  cv::Mat3f color;          ///< linear in sRGB values, 0 .. 255, BGR; meaningful where `color_sigma` is finite
+  cv::Mat1f color_sigma;    ///< spread of the static colour over the views, of one channel; NaN where never seen
+  double noise_factor = 1;  ///< how static depths scatter over the views, relative to their sigma
+};
+
+/// Separates the object from what stays the same. The images must have cameras of one size and intrinsics; views that
+/// differ are left as they are (and named by a warning). Classes become `background` where the object is not,
+/// `no_depth` where it is but has no depth, `outlier` where colour says object but the depth is that of the background.
+/// Returns how many depths went. With fewer than three usable views nothing can be said, a warning, and 0.
+/// The method is described in docs/import.md. Cost: linear in pixels times views, and a graph cut a view.
+std::size_t remove_static_background(ScanSet& set, Context& context);
+
+/// The model alone, from the given views. At least three.
+BackgroundModel static_background(std::vector<RangeImage const*> const& images);
+
+/// The object in one view: 255 where it is. `image` is not changed.
+cv::Mat1b object_mask(RangeImage const& image, BackgroundModel const& model);
+
+}  // namespace scanview
