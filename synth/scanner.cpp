@@ -1,0 +1,278 @@
+#include "synth/scanner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/random.h"
+#include "synth/ray_scene.h"
+#include "synth/surface_light.h"
+
+namespace scanview {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+constexpr int kBandRows = 8;     // a task
+constexpr int kSamplesSide = 4;  // rays a side of a pixel for colour
+static_assert(kSamplesSide * kSamplesSide == kPacket);
+
+/// The model around its own centre, so that single precision serves models far from the origin as well.
+struct CenteredModel {
+  Vector3d center = Vector3d::Zero();
+  double radius = 0;
+  std::vector<Vector3f> vertices;  // those that no triangle uses lie in the centre
+};
+
+CenteredModel centered(TriangleMesh const& model) {
+  Eigen::AlignedBox3d box;
+  for (auto const& t : model.triangles)
+    for (int c = 0; c < 3; ++c) box.extend(model.vertices[t[c]].cast<double>());
+  if (box.isEmpty()) throw Error(ErrorCode::bad_input, {}, "the model has no triangles: nothing to scan");
+  CenteredModel result;
+  result.center = box.center();
+  for (auto const& t : model.triangles)
+    for (int c = 0; c < 3; ++c)
+      result.radius = std::max(result.radius, (model.vertices[t[c]].cast<double>() - result.center).norm());
+  if (!(result.radius > 0) || !std::isfinite(result.radius))
+    throw Error(ErrorCode::bad_input, {}, "the model has no extent: nothing to scan");
+  result.vertices.assign(model.vertices.size(), Vector3f::Zero());
+  for (auto const& t : model.triangles)
+    for (int c = 0; c < 3; ++c)
+      result.vertices[t[c]] = (model.vertices[t[c]].cast<double>() - result.center).cast<float>();
+  return result;
+}
+
+/// From the object's centre to the eye of a view, unit.
+Vector3d eye_direction(SynthOptions const& options, int view) {
+  if (options.layout == SynthOptions::Layout::circle) {
+    double const azimuth = 2 * std::numbers::pi * view / options.views;
+    double const elevation = options.elevation_deg * std::numbers::pi / 180;
+    return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
+  }
+  double const y = 1 - (2.0 * view + 1) / options.views;
+  double const r = std::sqrt(1 - y * y), azimuth = std::numbers::pi * (3 - std::sqrt(5.0)) * view;
+  return {r * std::sin(azimuth), y, r * std::cos(azimuth)};
+}
+
+/// A camera at `eye` that looks at `target`, its picture's upper side towards +y (towards -z when it looks down or up).
+Isometry3d look_at(Vector3d const& eye, Vector3d const& target) {
+  Vector3d const forward = (target - eye).normalized();
+  Vector3d const up = std::abs(forward.y()) > 0.9999 ? Vector3d(0, 0, -1) : Vector3d(0, 1, 0);
+  Vector3d const right = forward.cross(up).normalized();
+  Isometry3d pose = Isometry3d::Identity();
+  pose.linear().col(0) = right;
+  pose.linear().col(1) = forward.cross(right);
+  pose.linear().col(2) = forward;
+  pose.translation() = eye;
+  return pose;
+}
+
+/// One focal length for all views: as long as the model stays within 94 % of every picture's width and height, and no
+/// shorter than for 106° of view (of a camera inside the model or close to it, the picture shows a part).
+Camera make_camera(SynthOptions const& options, CenteredModel const& model, std::vector<Isometry3d> const& poses,
+                   Context& context) {
+  double const half_width = 0.47 * options.width, half_height = 0.47 * options.height;
+  std::vector<double> fits(poses.size());
+  for_each_index(context, poses.size(), [&](std::size_t i) {
+    Isometry3d const camera_from_model = poses[i].inverse() * Eigen::Translation3d(model.center);
+    double f = std::numeric_limits<double>::infinity();
+    for (auto const& vertex : model.vertices) {
+      Vector3d const p = camera_from_model * vertex.cast<double>();
+      double const z = std::max(p.z(), 0.0);
+      f = std::min({f, half_width * z / std::abs(p.x()), half_height * z / std::abs(p.y())});
+    }
+    fits[i] = f;
+  });
+  double const widest = 0.75 * std::min(half_width, half_height);
+  double f = widest;
+  double const fit = *std::min_element(fits.begin(), fits.end());
+  if (std::isfinite(fit)) f = std::max(f, fit);
+  return Camera::perspective(options.width, options.height, f, f, 0.5 * (options.width - 1),
+                             0.5 * (options.height - 1));
+}
+
+Vector3d random_unit(CounterRandom& random) {
+  for (;;) {
+    double const x = random.normal(), y = random.normal(), z = random.normal();
+    Vector3d const v(x, y, z);
+    if (v.norm() > 1e-6) return v.normalized();
+  }
+}
+
+Isometry3d disturbed(Isometry3d const& pose, Vector3d const& center, double radius, SynthOptions const& options,
+                     CounterRandom random) {
+  Vector3d const axis = random_unit(random), move = random_unit(random);
+  Eigen::AngleAxisd const turn(options.disturb_deg * std::numbers::pi / 180, axis);
+  return Eigen::Translation3d(center + options.disturb_share * 2 * radius * move) * turn *
+         Eigen::Translation3d(-center) * pose;
+}
+
+/// Casts the rays of one view, in coordinates about the model's centre.
+class ViewScan {
+ public:
+  ViewScan(CenteredModel const& model, std::vector<Eigen::Vector3i> const& triangles, RayScene const& scene,
+           Camera const& camera, Isometry3d const& object_from_camera)
+      : model_(model),
+        triangles_(triangles),
+        scene_(scene),
+        camera_(camera),
+        rotation_(object_from_camera.linear()),
+        eye_(object_from_camera.translation() - model.center) {}
+
+  /// Depth of the surface at a pixel's centre; NaN where none is.
+  float depth(int x, int y) const {
+    Vector3d const direction = rotation_ * camera_.ray_direction(x, y);
+    RayHit const hit = scene_.first_hit(eye_.cast<float>(), direction.cast<float>());
+    if (hit.triangle < 0) return kMissing;
+    auto const& t = triangles_[hit.triangle];
+    Vector3d const a = vertex(t[0]), normal = (vertex(t[1]) - a).cross(vertex(t[2]) - a);
+    // The direction has z = 1 in the camera, so the ray's parameter is the depth. A plane seen edge-on says nothing.
+    double const exact = normal.dot(a - eye_) / normal.dot(direction);
+    double const margin = 1e-4 * (hit.distance + model_.radius);
+    return std::abs(exact - hit.distance) < margin ? static_cast<float>(exact) : hit.distance;
+  }
+
+  /// Calls `work(hit, direction)` for the 4 x 4 rays of a pixel.
+  template <class Work>
+  void for_each_sample(int x, int y, Work const& work) const {
+    RayDirections directions;
+    for (int i = 0; i < kPacket; ++i) {
+      double const u = x + (i % kSamplesSide + 0.5) / kSamplesSide - 0.5;
+      double const v = y + (i / kSamplesSide + 0.5) / kSamplesSide - 0.5;
+      directions[i] = (rotation_ * camera_.ray_direction(u, v)).cast<float>();
+    }
+    auto const hits = scene_.first_hits(eye_.cast<float>(), directions);
+    for (int i = 0; i < kPacket; ++i) work(hits[i], directions[i]);
+  }
+
+ private:
+  Vector3d vertex(int i) const { return model_.vertices[i].cast<double>(); }
+
+  CenteredModel const& model_;
+  std::vector<Eigen::Vector3i> const& triangles_;
+  RayScene const& scene_;
+  Camera camera_;
+  Eigen::Matrix3d rotation_;
+  Vector3d eye_;
+};
+
+/// What no ray hits, linear R G B.
+Vector3f background() {
+  static Vector3f const color(linear_from_srgb(96 / 255.0f), linear_from_srgb(110 / 255.0f),
+                              linear_from_srgb(128 / 255.0f));
+  return color;
+}
+
+cv::Vec3b encoded(Vector3f const& linear, double noise_sigma, CounterRandom& random) {
+  cv::Vec3b bgr;
+  for (int c = 0; c < 3; ++c) {
+    double value = 255.0 * srgb_from_linear(std::clamp(linear[2 - c], 0.0f, 1.0f));
+    if (noise_sigma > 0) value += noise_sigma * random.normal();
+    bgr[c] = cv::saturate_cast<uchar>(value);
+  }
+  return bgr;
+}
+
+void require(bool good, char const* what) {
+  if (!good) throw Error(ErrorCode::usage, {}, what);
+}
+
+}  // namespace
+
+void SynthOptions::validate() const {
+  require(views >= 1 && views <= 100000, "views: must be 1 to 100000");
+  require(width >= 1 && width <= 16384, "width: must be 1 to 16384");
+  require(height >= 1 && height <= 16384, "height: must be 1 to 16384");
+  require(elevation_deg >= -90 && elevation_deg <= 90, "elevation_deg: must be -90 to 90");
+  require(distance > 0 && distance <= 1e4, "distance: must be above 0 and at most 10000 radii");
+  require(disturb_deg >= 0 && disturb_deg <= 180, "disturb_deg: must be 0 to 180");
+  require(disturb_share >= 0 && disturb_share <= 10, "disturb_share: must be 0 to 10");
+  require(noise.depth_sigma >= 0 && noise.depth_sigma <= 1,
+          "noise.depth_sigma: must be 0 to 1 (a share of the radius)");
+  require(noise.color_sigma >= 0 && noise.color_sigma <= 255, "noise.color_sigma: must be 0 to 255");
+}
+
+SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, Context& context) {
+  options.validate();
+  model.check();
+  CenteredModel const object = centered(model);
+  RayScene const scene(object.vertices, model.triangles);
+  SurfaceLight light(object.vertices, model.triangles, model.colors);
+
+  double const noise_sigma = options.noise.depth_sigma * object.radius;
+  double const sigma = std::hypot(noise_sigma, kSynthDepthFloor * object.radius);
+  auto const pixels = static_cast<std::uint64_t>(options.width) * options.height;
+
+  SynthResult result;
+  result.radius = object.radius;
+  result.set.unit = Unit::mm;
+  result.set.center = object.center;
+  result.set.error_budget.sampling = {sigma, 1.959964 * sigma};  // normal distribution
+  for (int v = 0; v < options.views; ++v)
+    result.true_poses.push_back(
+        look_at(object.center + options.distance * object.radius * eye_direction(options, v), object.center));
+  Camera const camera = make_camera(options, object, result.true_poses, context);
+  for (int v = 0; v < options.views; ++v) {
+    Isometry3d const& pose = result.true_poses[v];
+    View view;
+    view.name = fmt::format("{:03d}", v);
+    view.image = empty_range_image(camera);
+    view.image.color.create(options.height, options.width);
+    view.image.classes.setTo(static_cast<int>(PixelClass::background));
+    view.object_from_camera =
+        v == 0 ? pose : disturbed(pose, object.center, object.radius, options, CounterRandom(context.seed, v, pixels));
+    result.set.views.push_back(std::move(view));
+    result.true_depth.emplace_back(options.height, options.width, kMissing);
+  }
+
+  auto const bands = static_cast<std::size_t>((options.height + kBandRows - 1) / kBandRows);
+  auto const for_each_pixel = [&](std::string const& stage, auto const& work) {
+    for_each_index(
+        context, bands * result.true_poses.size(),
+        [&](std::size_t task) {
+          std::size_t const v = task / bands;
+          ViewScan const scan(object, model.triangles, scene, camera, result.true_poses[v]);
+          int const first = static_cast<int>(task % bands) * kBandRows;
+          for (int y = first; y < std::min(first + kBandRows, options.height); ++y)
+            for (int x = 0; x < options.width; ++x) work(scan, v, x, y);
+        },
+        stage);
+  };
+  for_each_pixel("look", [&](ViewScan const& scan, std::size_t, int x, int y) {
+    scan.for_each_sample(x, y, [&](RayHit const& hit, Vector3f const& direction) {
+      if (hit.triangle >= 0) light.mark_seen(hit.triangle, direction);
+    });
+  });
+  light.light(scene, static_cast<float>(object.radius), context);
+  for_each_pixel("scan", [&](ViewScan const& scan, std::size_t v, int x, int y) {
+    CounterRandom random(context.seed, v, static_cast<std::uint64_t>(y) * options.width + x);
+    RangeImage& image = result.set.views[v].image;
+    float const depth = scan.depth(x, y);
+    result.true_depth[v](y, x) = depth;
+    auto const measured = static_cast<float>(depth + noise_sigma * random.normal());
+    if (measured > 0) {
+      image.depth(y, x) = measured;
+      image.sigma(y, x) = static_cast<float>(sigma);
+      image.classes(y, x) = static_cast<uchar>(PixelClass::object);
+    } else if (depth > 0) {
+      image.classes(y, x) = static_cast<uchar>(PixelClass::no_depth);  // noise carried it behind the camera
+    }
+    Vector3f sum = Vector3f::Zero();
+    scan.for_each_sample(x, y, [&](RayHit const& hit, Vector3f const& direction) {
+      sum += hit.triangle < 0 ? background() : light.leaving(hit, direction);
+    });
+    image.color(y, x) = encoded(sum / kPacket, options.noise.color_sigma, random);
+  });
+  for (View const& view : result.set.views) view.image.check();
+  return result;
+}
+
+}  // namespace scanview
