@@ -78,6 +78,40 @@ std::string encode_exr(std::vector<Channel> const& channels) {
   return memory.bytes();
 }
 
+struct WantedChannel {
+  char const* name;
+  cv::Mat1f* values;
+};
+
+void decode_exr(fs::path const& path, std::vector<WantedChannel> const& channels) {
+  std::string const bytes = read_file(path);
+  try {
+    MemoryInput memory(bytes, path.string());
+    Imf::InputFile file(memory, 0);
+    auto const box = file.header().dataWindow();
+    std::int64_t const width = std::int64_t{box.max.x} - box.min.x + 1,
+                       height = std::int64_t{box.max.y} - box.min.y + 1;
+    // A scan line takes at least a byte of its offset table: a header cannot ask for more rows than the file has bytes.
+    if (width < 1 || height < 1 || width > (1 << 15) || height > (1 << 15) ||
+        height > static_cast<std::int64_t>(bytes.size()))
+      throw Error(ErrorCode::bad_input, path, "has an impossible size");
+    Imf::FrameBuffer buffer;
+    for (auto const& channel : channels) {
+      if (!file.header().channels().findChannel(channel.name))
+        throw Error(ErrorCode::bad_input, path, fmt::format("has no channel {}", channel.name));
+      channel.values->create(static_cast<int>(height), static_cast<int>(width));
+      buffer.insert(channel.name,
+                    Imf::Slice::Make(Imf::FLOAT, channel.values->ptr(), box, sizeof(float), channel.values->step));
+    }
+    file.setFrameBuffer(buffer);
+    file.readPixels(box.min.y, box.max.y);
+  } catch (Error const&) {
+    throw;
+  } catch (std::exception const&) {
+    throw Error(ErrorCode::bad_input, path, "is damaged or no OpenEXR file");
+  }
+}
+
 std::string text(Json const& json, char const* key, fs::path const& path) {
   auto const it = json.find(key);
   if (it == json.end() || !it->is_string())
@@ -100,9 +134,7 @@ Eigen::Vector3d triple(Json const& json, char const* key, fs::path const& path) 
 
 Json to_json(Eigen::Vector3d const& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
-Json to_json(ErrorPart const& part) {
-  return {{"rms", json_number(part.rms)}, {"p95", json_number(part.p95)}};
-}
+Json to_json(ErrorPart const& part) { return {{"rms", json_number(part.rms)}, {"p95", json_number(part.p95)}}; }
 
 ErrorPart error_part(Json const& budget, char const* key, fs::path const& path) {
   ErrorPart part;
@@ -255,32 +287,13 @@ void write_range_exr(fs::path const& path, cv::Mat1f const& depth, cv::Mat1f con
 void write_depth_exr(fs::path const& path, cv::Mat1f const& depth) { write_file(path, encode_exr({{"Z", &depth}})); }
 
 void read_range_exr(fs::path const& path, cv::Mat1f& depth, cv::Mat1f& sigma) {
-  std::string const bytes = read_file(path);
-  try {
-    MemoryInput memory(bytes, path.string());
-    Imf::InputFile file(memory, 0);
-    auto const box = file.header().dataWindow();
-    std::int64_t const width = std::int64_t{box.max.x} - box.min.x + 1,
-                       height = std::int64_t{box.max.y} - box.min.y + 1;
-    // A scan line takes at least a byte of its offset table: a header cannot ask for more rows than the file has bytes.
-    if (width < 1 || height < 1 || width > (1 << 15) || height > (1 << 15) ||
-        height > static_cast<std::int64_t>(bytes.size()))
-      throw Error(ErrorCode::bad_input, path, "has an impossible size");
-    for (char const* name : {"S", "Z"})
-      if (!file.header().channels().findChannel(name))
-        throw Error(ErrorCode::bad_input, path, fmt::format("has no channel {}", name));
-    depth.create(static_cast<int>(height), static_cast<int>(width));
-    sigma.create(depth.size());
-    Imf::FrameBuffer buffer;
-    buffer.insert("Z", Imf::Slice::Make(Imf::FLOAT, depth.ptr(), box, sizeof(float), depth.step));
-    buffer.insert("S", Imf::Slice::Make(Imf::FLOAT, sigma.ptr(), box, sizeof(float), sigma.step));
-    file.setFrameBuffer(buffer);
-    file.readPixels(box.min.y, box.max.y);
-  } catch (Error const&) {
-    throw;
-  } catch (std::exception const&) {
-    throw Error(ErrorCode::bad_input, path, "is damaged or no OpenEXR file");
-  }
+  decode_exr(path, {{"S", &sigma}, {"Z", &depth}});
+}
+
+cv::Mat1f read_depth_exr(fs::path const& path) {
+  cv::Mat1f depth;
+  decode_exr(path, {{"Z", &depth}});
+  return depth;
 }
 
 }  // namespace scanview

@@ -30,7 +30,8 @@ std::vector<std::filesystem::path> image_files(ScanSet const& set);
 /// 32-bit float channels Z and S (and any others are ignored on reading). NaN = missing. ZIPS compression.
 void write_range_exr(std::filesystem::path const& path, cv::Mat1f const& depth, cv::Mat1f const& sigma);
 void read_range_exr(std::filesystem::path const& path, cv::Mat1f& depth, cv::Mat1f& sigma);
-/// One channel Z (rendered depth).
+/// One channel Z (rendered depth). Reading takes any file that has it.
 void write_depth_exr(std::filesystem::path const& path, cv::Mat1f const& depth);
+cv::Mat1f read_depth_exr(std::filesystem::path const& path);
 
 }  // namespace scanview
