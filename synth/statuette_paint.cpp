@@ -105,7 +105,7 @@ Vector3f paint_plinth_bottom(Vector3f const& p) {
   Vector3f const clay = rgb(0xc98d5e) * (1.0f + 0.16f * fractal_noise(p * 0.35f, 5));
   float const rings =
       inside(std::abs(r - 30) - 0.8f) + inside(std::abs(r - 34) - 0.35f) + inside(std::abs(r - 16) - 0.5f);
-  float const text_height = 9;
+  float const text_height = 6;
   float const text = words.ink((p.x() + 0.5f * words.width() * text_height) / text_height, p.z() / text_height + 0.5f);
   float const spokes =
       inside(std::abs(std::sin(6 * std::atan2(p.z(), p.x()))) * r - 1.2f) * step(19, r, 0.4f) * (1 - step(28, r, 0.4f));
