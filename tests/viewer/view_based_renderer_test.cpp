@@ -2,27 +2,401 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "base/error.h"
+#include "viewer/evaluate/image_quality.h"
 #include "viewer/scene.h"
 
 namespace scanview {
 namespace {
+
 using namespace test;
-TEST(Smoke, Renders) {
-  auto const context = make_offscreen_context();
-  Camera const camera = Camera::perspective(160, 120, 150, 150, 80, 59);
-  auto const pose = look_at({0, 1, 4}, {0, 0, 0});
-  auto const scene = scan(sphere({0, 0, 0}, 1), camera, {pose}, 0.2, 0.05);
-  auto const renderer = make_view_based_renderer(*context, scene.set, scene.meshes);
-  auto const frame = renderer->render(camera, pose);
-  EXPECT_GT(drawn_pixels(frame.color), 1000U);
-  cv::Mat3b const p = bgr(frame.color);
-  int worst = 0;
-  for (int y = 0; y < 120; ++y)
-    for (int x = 0; x < 160; ++x)
-      if (frame.color(y, x)[3])
-        for (int c = 0; c < 3; ++c)
-          worst = std::max(worst, std::abs(int(p(y, x)[c]) - int(scene.set.views[0].image.color(y, x)[c])));
-  EXPECT_LE(worst, 1);
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+constexpr double kDegree = std::numbers::pi / 180;
+
+GlContext& context() {
+  static auto const shared = make_offscreen_context();
+  return *shared;
 }
+
+Camera small_camera() { return Camera::perspective(160, 120, 150, 155, 83.25, 56.5); }
+
+Isometry3d around(double azimuth_deg, double elevation_deg, double distance = 4) {
+  double const a = azimuth_deg * kDegree, e = elevation_deg * kDegree;
+  return look_at(distance * Vector3d(std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a)),
+                 Vector3d::Zero());
+}
+
+Scene ball(std::vector<Isometry3d> const& poses, Camera const& camera = small_camera()) {
+  return scan(sphere(Vector3d::Zero(), 1), camera, poses, 0.3, 0.02);
+}
+
+cv::Mat1b drawn_mask(Frame const& frame) {
+  cv::Mat1b mask;
+  cv::extractChannel(frame.color, mask, 3);
+  return mask;
+}
+
+/// Against what a ray caster sees from there, where both see something.
+double psnr_to_truth(Frame const& frame, Surface const& surface, Camera const& camera, Isometry3d const& pose) {
+  View const truth = capture(surface, camera, pose, "truth");
+  return psnr(bgr(frame.color), truth.image.color, drawn_mask(frame) & (truth.image.classes == 255));
+}
+
+Frame draw(Scene const& scene, Camera const& camera, Isometry3d const& pose, ViewBasedOptions const& options = {}) {
+  return make_view_based_renderer(context(), scene.set, scene.meshes, options)->render(camera, pose);
+}
+
+TEST(ViewBasedRenderer, ReproducesThePhotographAtASourceCamera) {
+  auto const scene = ball({around(0, 10), around(120, 0), around(240, -10), around(10, 80)});
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    View const& view = scene.set.views[i];
+    ViewMesh const& mesh = scene.meshes[i];
+    auto const frame = renderer->render(small_camera(), *view.object_from_camera);
+    cv::Mat1b const object = view.image.classes == 255;
+    cv::Mat1b const drawn = drawn_mask(frame);
+    // Texel centres fall on pixel centres: what is left is rounding to 8 bits (at most 1: 48 dB).
+    EXPECT_GT(psnr(bgr(frame.color), view.image.color, drawn & object), 48);
+    // All but the outline's own pixels, which the grid's triangles reach but do not cover.
+    EXPECT_GT(cv::countNonZero(drawn & object), 0.95 * cv::countNonZero(object));
+    EXPECT_EQ(cv::countNonZero(drawn & ~object), 0);
+    for (int y = 0; y < object.rows; ++y) {
+      for (int x = 0; x < object.cols; ++x) {
+        ASSERT_EQ(std::isnan(frame.depth(y, x)), drawn(y, x) == 0);
+        // The view's own mesh has its vertices at pixel centres; near its rim other views have a share.
+        if (drawn(y, x) != 0 && mesh.feather(y, x) == 255) {
+          ASSERT_NEAR(frame.depth(y, x), view.image.depth(y, x), 1e-3);
+        }
+      }
+    }
+  }
+}
+
+TEST(ViewBasedRenderer, ReproducesAnOrthographicPhotograph) {
+  Camera const camera = Camera::orthographic(150, 130, 0.02, 0.018, 70.5, 66);
+  // A range image may start anywhere along the axis: depths here run from -1 to 0.
+  auto const scene = scan(sphere(Vector3d::Zero(), 1), camera, {around(30, 20, 4), around(150, 0, 4)}, 0.3, 0.02);
+  auto const frame = draw(scene, camera, *scene.set.views[0].object_from_camera);
+  EXPECT_GT(psnr(bgr(frame.color), scene.set.views[0].image.color, drawn_mask(frame)), 48);
+}
+
+TEST(ViewBasedRenderer, OrthographicDepthsMayBeNegative) {
+  Camera const camera = Camera::orthographic(60, 50, 0.05, 0.05, 30, 25);
+  auto scene = scan(sphere(Vector3d::Zero(), 1), camera, {around(30, 20, 4)}, 0.3, 0.02);
+  // The same object and picture with the image plane moved through it to its far side.
+  auto const before = draw(scene, camera, *scene.set.views[0].object_from_camera);
+  scene.set.views[0].image.depth -= 5;
+  for (auto& vertex : scene.meshes[0].mesh.vertices) vertex.z() -= 5;
+  scene.set.views[0].object_from_camera = *scene.set.views[0].object_from_camera * Eigen::Translation3d(0, 0, 5);
+  auto const after = draw(scene, camera, *scene.set.views[0].object_from_camera);
+  EXPECT_GT(drawn_pixels(after.color), 500U);
+  EXPECT_GT(psnr(bgr(before.color), bgr(after.color), drawn_mask(before)), 60);
+}
+
+TEST(ViewBasedRenderer, PictureIsNeitherMirroredNorUpsideDown) {
+  auto const scene = ball({around(0, 0)});
+  auto const frame = draw(scene, small_camera(), around(0, 0));
+  cv::Mat3b const truth = scene.set.views[0].image.color;
+  for (int const code : {0, 1, -1}) {
+    cv::Mat3b flipped;
+    cv::flip(truth, flipped, code);
+    EXPECT_LT(psnr(bgr(frame.color), flipped, drawn_mask(frame)), 20);
+  }
+}
+
+TEST(ViewBasedRenderer, NewSidesAgreeWithARayCaster) {
+  std::vector<Isometry3d> poses;
+  for (int i = 0; i < 8; ++i) poses.push_back(around(45 * i, i % 2 == 0 ? 30 : -20));
+  auto const scene = ball(poses, Camera::perspective(320, 240, 300, 300, 160, 120));
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  Camera const perspective = Camera::perspective(200, 150, 190, 180, 90, 80);
+  Camera const orthographic = Camera::orthographic(200, 150, 0.015, 0.016, 95, 70);
+  for (auto const& camera : {perspective, orthographic}) {
+    for (double const azimuth : {20.0, 100.0, 170.0, 300.0}) {
+      auto const frame = renderer->render(camera, around(azimuth, 8));
+      EXPECT_GT(psnr_to_truth(frame, sphere(Vector3d::Zero(), 1), camera, around(azimuth, 8)), 30);
+      EXPECT_GT(drawn_pixels(frame.color), 5000U);
+    }
+  }
+}
+
+TEST(ViewBasedRenderer, ACroppedCameraDrawsTheCrop) {
+  auto const scene = ball({around(0, 0), around(50, 20)});
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  for (auto const& camera : {small_camera(), Camera::orthographic(160, 120, 0.02, 0.02, 81, 64)}) {
+    auto const whole = renderer->render(camera, around(20, 5));
+    auto const part = renderer->render(camera.cropped(45, 22, 50, 61), around(20, 5));
+    cv::Mat difference;
+    cv::absdiff(whole.color(cv::Rect(45, 22, 50, 61)), part.color, difference);
+    // Window coordinates are snapped to 1/256 pixel after another rounding: single pixels of the outline may differ.
+    cv::Mat1b different(difference.size());
+    for (int y = 0; y < difference.rows; ++y) {
+      for (int x = 0; x < difference.cols; ++x) {
+        different(y, x) = cv::norm(difference.at<cv::Vec4b>(y, x), cv::NORM_INF) > 4 ? 255 : 0;
+      }
+    }
+    EXPECT_LT(cv::countNonZero(different), 10);
+  }
+}
+
+TEST(ViewBasedRenderer, NeverShowsTheBackgroundOfAPhotograph) {
+  auto const scene = ball({around(0, 0), around(60, 0), around(30, 50)});
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  // From near (magnified) and far (mipmaps). The background is magenta; no colour of paint() comes near to it, whose
+  // green is at least 89 in 8-bit sRGB (0.1 linear) less rounding.
+  for (double const distance : {2.0, 4.0, 20.0}) {
+    auto const frame = renderer->render(Camera::perspective(120, 120, 110, 110, 60, 60), around(30, 15, distance));
+    EXPECT_GT(drawn_pixels(frame.color), 20U);
+    for (auto const& pixel : frame.color) {
+      if (pixel[3] != 0) {
+        ASSERT_GE(pixel[1], 86);
+      }
+    }
+  }
+}
+
+TEST(ViewBasedRenderer, FewViewsAndCirclesGiveDefinedPictures) {
+  std::vector<std::vector<Isometry3d>> sets{
+      {around(0, 0)}, {around(0, 0), around(50, 10)}, {around(0, 0), around(180, 0)}};
+  sets.emplace_back();
+  for (int i = 0; i < 8; ++i) sets.back().push_back(around(45 * i, 32));
+  for (auto const& poses : sets) {
+    auto const scene = ball(poses);
+    auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+    for (double const elevation : {-90.0, -40.0, 0.0, 60.0, 90.0}) {
+      auto const pose = look_at(around(20, elevation).translation(), Vector3d::Zero(), Vector3d(0.1, 1, 0.2));
+      auto const frame = renderer->render(small_camera(), pose);
+      if (drawn_pixels(frame.color) < 200) continue;  // from where no view has seen the ball
+      // The best view is up to 122 degrees away here (from below the turntable): textures at a grazing angle.
+      EXPECT_GT(psnr_to_truth(frame, sphere(Vector3d::Zero(), 1), small_camera(), pose), 20);
+    }
+  }
+}
+
+TEST(ViewBasedRenderer, FrontAndBackOfAThinSheetDoNotBlend) {
+  // A sheet thinner than the threshold, red in front and blue behind, seen almost from its edge.
+  Vector3d const red(1, 0, 0), blue(0, 0, 1);
+  auto const surface = together({sheet(0.005, 0.8, 1, red), sheet(-0.005, 0.8, -1, blue)});
+  auto const scene = scan(surface, small_camera(), {around(0, 0), around(180, 0)}, 0.3, 0.1);
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  for (double const azimuth : {20.0, 60.0, 84.0, 96.0, 120.0, 160.0}) {
+    auto const frame = renderer->render(small_camera(), around(azimuth, 0));
+    EXPECT_GT(drawn_pixels(frame.color), 100U);
+    for (auto const& pixel : frame.color) {
+      if (pixel[3] == 0) continue;
+      ASSERT_EQ(pixel, azimuth < 90 ? cv::Vec4b(0, 0, 255, 255) : cv::Vec4b(255, 0, 0, 255)) << azimuth;
+    }
+  }
+}
+
+/// Two views from one place: the first sees a red sheet at depth 3, the second a green one `gap` behind it.
+Scene two_layers(double gap, float front_cosine) {
+  auto const pose = around(0, 0);
+  auto scene = scan(sheet(1, 0.5, 1, {1, 0, 0}), small_camera(), {pose}, 0.3, 0.1);
+  auto const behind = scan(sheet(1 - gap, 1.2, 1, {0, 1, 0}), small_camera(), {pose}, 0.3, 0.1);
+  scene.set.views.push_back(behind.set.views[0]);
+  scene.set.views[1].name = "001";
+  scene.meshes.push_back(behind.meshes[0]);
+  for (auto& c : scene.meshes[0].cos_phi) c = front_cosine;
+  return scene;
+}
+
+cv::Vec4b center_of(Frame const& frame) { return frame.color(56, 83); }
+
+TEST(SoftZ, WhatLiesBehindIsHidden) {
+  auto const frame = draw(two_layers(0.5, 1), small_camera(), around(0, 0));
+  EXPECT_EQ(center_of(frame), cv::Vec4b(0, 0, 255, 255));
+  EXPECT_NEAR(frame.depth(56, 83), 3, 1e-4);
+}
+
+TEST(SoftZ, WithinTheThresholdAllAreAveraged) {
+  // Equal weights: half red and half green in linear light, 188 in sRGB.
+  auto const frame = draw(two_layers(0.05, 1), small_camera(), around(0, 0));
+  EXPECT_NEAR(center_of(frame)[1], 188, 1);
+  EXPECT_NEAR(center_of(frame)[2], 188, 1);
+  EXPECT_NEAR(frame.depth(56, 83), 3.025, 1e-3);
+}
+
+TEST(SoftZ, WeightsRampToZeroAtOneAndAHalfThresholds) {
+  // Green behind by 1.25 thresholds has half its weight: a third of the mixture, linear 1/3: 156 in sRGB.
+  EXPECT_NEAR(center_of(draw(two_layers(0.125, 1), small_camera(), around(0, 0)))[1], 156, 2);
+  EXPECT_EQ(center_of(draw(two_layers(0.151, 1), small_camera(), around(0, 0)))[1], 0);
+}
+
+TEST(SoftZ, AnUnreliableSampleInFrontIsIgnored) {
+  auto const scene = two_layers(0.5, 0.02F);
+  EXPECT_EQ(center_of(draw(scene, small_camera(), around(0, 0))), cv::Vec4b(0, 255, 0, 255));
+  ViewBasedOptions options;
+  options.reliability_ratio = 0;  // every sample is reliable
+  EXPECT_EQ(center_of(draw(scene, small_camera(), around(0, 0), options)), cv::Vec4b(0, 0, 255, 255));
+}
+
+TEST(SoftZ, ThresholdsOfZeroAndInfinityAreTheLimits) {
+  ViewBasedOptions options;
+  options.threshold = 0;
+  EXPECT_EQ(center_of(draw(two_layers(0.01, 1), small_camera(), around(0, 0), options)), cv::Vec4b(0, 0, 255, 255));
+  options.threshold = std::numeric_limits<double>::infinity();
+  EXPECT_NEAR(center_of(draw(two_layers(0.9, 1), small_camera(), around(0, 0), options))[1], 188, 1);
+}
+
+TEST(ViewBasedRenderer, FillViewsShowWhereNoMainViewHasASample) {
+  // Four views along the equator; the two near the eye have lost their lower halves.
+  auto scene = ball({around(-40, 0), around(0, 0), around(40, 0), around(80, 0)});
+  for (std::size_t const i : {1U, 2U}) {
+    auto& mesh = scene.meshes[i];
+    mesh.mesh.triangles.resize(mesh.mesh.triangles.size() / 2);
+    mesh.cos_phi.resize(mesh.mesh.triangles.size());
+  }
+  ViewBasedOptions none;
+  none.fill_views = 0;
+  auto const without = draw(scene, small_camera(), around(20, 0), none);
+  auto const with = draw(scene, small_camera(), around(20, 0));
+  EXPECT_GT(drawn_pixels(with.color), 1.5 * static_cast<double>(drawn_pixels(without.color)));
+  // Where the main views have good samples the picture is theirs alone.
+  EXPECT_EQ(center_of(with), center_of(without));
+  EXPECT_GT(psnr_to_truth(with, sphere(Vector3d::Zero(), 1), small_camera(), around(20, 0)), 25);
+}
+
+TEST(ViewBasedRenderer, WeightsOfZeroStillShowAViewThatIsAlone) {
+  auto scene = ball({around(0, 0)});
+  scene.meshes[0].feather = 0;
+  for (auto& c : scene.meshes[0].cos_phi) c = 0;
+  auto const frame = draw(scene, small_camera(), around(0, 0));
+  EXPECT_GT(drawn_pixels(frame.color), 3000U);
+  EXPECT_GT(psnr(bgr(frame.color), scene.set.views[0].image.color, drawn_mask(frame)), 45);
+}
+
+TEST(ViewBasedRenderer, GainMultipliesLinearLight) {
+  auto scene = scan(sheet(0, 0.8, 1, {0.25, 0.25, 0.25}), small_camera(), {around(0, 0)}, 0.3, 0.1);
+  scene.set.views[0].gain = {2, 1, 0.5};
+  auto const pixel = center_of(draw(scene, small_camera(), around(0, 0)));
+  EXPECT_NEAR(pixel[2], 188, 1);  // 0.5
+  EXPECT_NEAR(pixel[1], 137, 1);  // 0.25
+  EXPECT_NEAR(pixel[0], 99, 1);   // 0.125
+}
+
+TEST(ViewBasedRenderer, OnePixelIsAPicture) {
+  auto const scene = ball({around(0, 0), around(60, 0)});
+  auto const frame = draw(scene, Camera::perspective(1, 1, 1, 1, 0, 0), around(10, 0));
+  ASSERT_EQ(frame.color.size(), cv::Size(1, 1));
+  EXPECT_EQ(frame.color(0, 0)[3], 255);
+}
+
+TEST(ViewBasedRenderer, NothingIsDrawnOfWhatLiesBehindTheCamera) {
+  auto const scene = ball({around(0, 0), around(60, 0)});
+  auto const away = look_at({0, 0, 4}, {0, 0, 8});
+  auto const frame = draw(scene, small_camera(), away);
+  EXPECT_EQ(drawn_pixels(frame.color), 0U);
+  EXPECT_TRUE(std::isnan(frame.depth(0, 0)));
+  // And from inside and among the object's surface nothing breaks.
+  draw(scene, small_camera(), look_at({0, 0, 0}, {0, 0, 1}));
+  draw(scene, small_camera(), look_at({0, 0, 1}, {1, 0, 1}));
+}
+
+TEST(ViewBasedRenderer, AMillionUnitsFromTheOriginLooksTheSame) {
+  std::vector<Isometry3d> const poses{around(0, 10), around(60, 0)};
+  auto scene = ball(poses);
+  auto const near = draw(scene, small_camera(), around(25, 5));
+  Eigen::Translation3d const shift(1e6, -2e6, 3e6);
+  for (auto& view : scene.set.views) view.object_from_camera = shift * *view.object_from_camera;
+  scene.set.center = shift * Vector3d::Zero();
+  auto const far = draw(scene, small_camera(), shift * around(25, 5));
+  // Poses of 1e6 units hold 1e-10 units in double, a millionth of a pixel here.
+  EXPECT_EQ(drawn_pixels(near.color), drawn_pixels(far.color));
+  EXPECT_GT(psnr(bgr(near.color), bgr(far.color), drawn_mask(near)), 60);
+}
+
+TEST(ViewBasedRenderer, MovingTheEyeALittleChangesThePictureALittle) {
+  std::vector<Isometry3d> poses;
+  for (int i = 0; i < 6; ++i) poses.push_back(around(60 * i, 25));
+  poses.push_back(around(10, -60));
+  auto const scene = ball(poses);
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  // Over a whole turn and over the pole. A step of 0.02 degrees moves the ball's surface by 0.02 pixels, whose colours
+  // change by at most about 25 of 255 a pixel: below 1 a step, plus 1 of rounding. A view that pops would change a
+  // region.
+  for (auto const& axis : {Vector3d(0.1, 1, 0), Vector3d(1, 0.1, 0.2)}) {
+    for (int i = 0; i < 40; ++i) {
+      auto const turned = [&](double degrees) {
+        return Isometry3d(Eigen::AngleAxisd(degrees * kDegree, axis.normalized())) * around(5, 10);
+      };
+      auto const a = renderer->render(small_camera(), turned(9 * i));
+      auto const b = renderer->render(small_camera(), turned(9 * i + 0.02));
+      int worse = 0;
+      for (int y = 0; y < a.color.rows; ++y) {
+        for (int x = 0; x < a.color.cols; ++x) {
+          if (a.color(y, x)[3] == b.color(y, x)[3] && cv::norm(a.color(y, x) - b.color(y, x), cv::NORM_INF) > 3)
+            ++worse;
+        }
+      }
+      ASSERT_LT(worse, 40) << i;  // outlines of views within the ball
+    }
+  }
+}
+
+TEST(ViewBasedRenderer, ViewsWithoutTrianglesAreLeftOut) {
+  auto scene = ball({around(0, 0), around(60, 0), around(30, 40)});
+  scene.meshes[2].mesh = {};
+  scene.meshes[2].cos_phi.clear();
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  for (auto const& weight : renderer->view_weights(small_camera(), around(30, 40))) EXPECT_NE(weight.view, 2U);
+  EXPECT_GT(drawn_pixels(renderer->render(small_camera(), around(30, 30)).color), 2000U);
+}
+
+TEST(ViewBasedRenderer, ExcludedViewsAreNotUsed) {
+  auto const scene = ball({around(0, 0), around(60, 0), around(30, 40)});
+  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  EXPECT_NEAR(renderer->view_weights(small_camera(), around(0, 0))[0].weight, 1, 0.01);
+  renderer->exclude({0});
+  for (auto const& weight : renderer->view_weights(small_camera(), around(0, 0))) EXPECT_NE(weight.view, 0U);
+  EXPECT_THROW(renderer->exclude({0, 1, 2}), Error);
+}
+
+TEST(ViewBasedRenderer, RefusesWhatItCannotDraw) {
+  auto scene = ball({around(0, 0)});
+  auto without_pose = scene;
+  without_pose.set.views[0].object_from_camera.reset();
+  EXPECT_THROW(draw(without_pose, small_camera(), around(0, 0)), Error);
+  auto without_mesh = scene;
+  without_mesh.meshes[0].mesh = {};
+  without_mesh.meshes[0].cos_phi.clear();
+  EXPECT_THROW(draw(without_mesh, small_camera(), around(0, 0)), Error);
+  auto wrong_cosines = scene;
+  wrong_cosines.meshes[0].cos_phi.pop_back();
+  EXPECT_THROW(draw(wrong_cosines, small_camera(), around(0, 0)), Error);
+  Isometry3d bad = around(0, 0);
+  bad.translation().x() = NAN;
+  EXPECT_THROW(draw(scene, small_camera(), bad), Error);
+  EXPECT_THROW(draw(scene, Camera::perspective(1 << 20, 2, 1, 1, 0, 0), around(0, 0)), Error);
+  ViewBasedOptions options;
+  options.reliability_ratio = 2;
+  EXPECT_THROW(draw(scene, small_camera(), around(0, 0), options), Error);
+}
+
+TEST(GlContext, OsMesaAndSurfacelessEglDrawTheSame) {
+  auto const scene = ball({around(0, 0), around(60, 0)});
+  auto const osmesa = draw(scene, small_camera(), around(20, 10));
+  std::unique_ptr<GlContext> egl;
+  try {
+    egl = make_offscreen_context(OffscreenKind::egl);
+  } catch (Error const& error) {
+    GTEST_SKIP() << error.what();
+  }
+  Frame frame;
+  {
+    auto const renderer = make_view_based_renderer(*egl, scene.set, scene.meshes);
+    // Both in turn: each binds itself.
+    draw(scene, small_camera(), around(20, 10));
+    frame = renderer->render(small_camera(), around(20, 10));
+  }
+  EXPECT_GT(psnr(bgr(osmesa.color), bgr(frame.color), drawn_mask(osmesa)), 40);
+}
+
 }  // namespace
 }  // namespace scanview

@@ -283,24 +283,23 @@ TEST(ViewSphere, RefusesViewsWithoutDirection) {
   EXPECT_THROW(ViewSphere({Vector3d(1, 0, 0)}).weights(Vector3d::Zero()), Error);
 }
 
-TEST(FillViews, AreFaintAndDoNotPop) {
+TEST(FillViews, AreTheNearestAndDoNotPop) {
   auto const directions = random_views(30, 6);
   ViewSphere const sphere(directions);
   CounterRandom random(17, 0);
   auto const filled = [&](Vector3d const& eye) {
     std::map<std::size_t, double> result;
-    for (auto const& w : add_fill_views(sphere.weights(eye), directions, eye, 4)) result[w.view] = w.weight;
+    for (auto const& used : add_fill_views(sphere.weights(eye), directions, eye, 4)) result[used.view] = used.fill;
     return result;
   };
   for (int i = 0; i < 500; ++i) {
     Vector3d const eye = random_direction(random);
-    auto const main = weights_of(sphere, eye);
-    auto const all = filled(eye);
-    // Seven nearest views share at most seven faint weights.
-    EXPECT_LT(change(main, all), 7 * kFaintWeight);
-    EXPECT_GE(all.size(), 6U);
+    auto const fill = filled(eye);
+    for (auto const& [view, value] : fill) EXPECT_TRUE(value >= 0 && value <= 1);
+    EXPECT_EQ(std::count_if(fill.begin(), fill.end(), [](auto const& f) { return f.second > 0; }), 7);
     Vector3d const near = (eye + 1e-7 * random_direction(random)).normalized();
-    EXPECT_LT(change(all, filled(near)), 300 * 1e-7);
+    // 1 - angle / horizon: the horizon is at least 5 degrees away.
+    EXPECT_LT(change(fill, filled(near)), 2e-7 / (5 * kDegree));
   }
 }
 
@@ -308,7 +307,13 @@ TEST(FillViews, NoneIsThePapersMethod) {
   auto const directions = random_views(10, 8);
   ViewSphere const sphere(directions);
   Vector3d const eye = at(10, 20);
-  EXPECT_EQ(add_fill_views(sphere.weights(eye), directions, eye, 0).size(), sphere.weights(eye).size());
+  auto const weights = sphere.weights(eye);
+  auto const used = add_fill_views(weights, directions, eye, 0);
+  ASSERT_EQ(used.size(), weights.size());
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    EXPECT_EQ(used[i].weight, weights[i].weight);
+    EXPECT_EQ(used[i].fill, 0);
+  }
 }
 
 }  // namespace

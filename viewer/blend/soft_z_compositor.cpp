@@ -23,7 +23,8 @@ const int MAX_LAYERS = 24;
 uniform sampler2DArray color_layers;
 uniform sampler2DArray depth_layers;
 uniform int layer_count;
-uniform float view_weight[MAX_LAYERS];
+uniform float layer_weight[MAX_LAYERS];
+uniform float layer_fill[MAX_LAYERS];
 uniform float threshold;
 uniform float ramp;               // 1 / (half a threshold)
 uniform float reliability_ratio;
@@ -42,16 +43,29 @@ void main() {
   float w[MAX_LAYERS];
   float z[MAX_LAYERS];
   int layer[MAX_LAYERS];
+  float quality[MAX_LAYERS];
   int count = 0;
+  float good = 0.0;
   for (int i = 0; i < layer_count; ++i) {
-    float weight = texelFetch(color_layers, ivec3(pixel, i), 0).a * view_weight[i];
-    if (weight > 0.0) {
-      w[count] = weight;
-      z[count] = texelFetch(depth_layers, ivec3(pixel, i), 0).r;
-      layer[count] = i;
-      ++count;
+    float q = texelFetch(color_layers, ivec3(pixel, i), 0).a;
+    if (q > 0.0) {
+      quality[count] = q;
+      layer[count++] = i;
+      good += layer_weight[i] * min(1.0, 0.3 + q / 0.1);
     }
   }
+  float need = clamp(1.0 - good / 0.3, 0.0, 1.0);
+  int kept = 0;
+  for (int k = 0; k < count; ++k) {
+    int i = layer[k];
+    float weight = (layer_weight[i] + need * layer_fill[i]) * quality[k];
+    if (weight > 0.0) {
+      w[kept] = weight;
+      z[kept] = texelFetch(depth_layers, ivec3(pixel, i), 0).r;
+      layer[kept++] = i;
+    }
+  }
+  count = kept;
   float reliable[MAX_LAYERS];
   for (int i = 0; i < count; ++i) {
     float doubt = 0.0;
@@ -110,9 +124,9 @@ void SoftZCompositor::resize(int width, int height) {
   height_ = height;
 }
 
-Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<double> const& view_weights, double threshold,
+Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<LayerWeight> const& weights, double threshold,
                                double reliability_ratio) {
-  if (view_weights.size() > static_cast<std::size_t>(kMaxLayers)) {
+  if (weights.size() > static_cast<std::size_t>(kMaxLayers)) {
     throw std::logic_error("SoftZCompositor: too many layers");
   }
   resize(layers.width(), layers.height());
@@ -127,10 +141,14 @@ Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<double> c
   gl_.BindTexture(GL_TEXTURE_2D_ARRAY, layers.depth());
   gl_.Uniform1i(program_.uniform("color_layers"), 0);
   gl_.Uniform1i(program_.uniform("depth_layers"), 1);
-  gl_.Uniform1i(program_.uniform("layer_count"), static_cast<GLint>(view_weights.size()));
-  std::vector<float> weights(view_weights.begin(), view_weights.end());
-  weights.resize(kMaxLayers, 0.0F);
-  gl_.Uniform1fv(program_.uniform("view_weight"), kMaxLayers, weights.data());
+  gl_.Uniform1i(program_.uniform("layer_count"), static_cast<GLint>(weights.size()));
+  std::vector<float> weight(kMaxLayers, 0.0F), fill(kMaxLayers, 0.0F);
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    weight[i] = static_cast<float>(weights[i].weight);
+    fill[i] = static_cast<float>(weights[i].fill);
+  }
+  gl_.Uniform1fv(program_.uniform("layer_weight"), kMaxLayers, weight.data());
+  gl_.Uniform1fv(program_.uniform("layer_fill"), kMaxLayers, fill.data());
   // Infinite and zero thresholds stay finite in the shader's arithmetic and mean the same.
   constexpr double kLargest = 1e30, kSteepest = 1e30;
   threshold = std::min(threshold, kLargest);

@@ -18,41 +18,31 @@ Vector3d direction_to_eye(Camera const& camera, Eigen::Isometry3d const& object_
   return (to_eye / length).normalized();
 }
 
-std::vector<ViewWeight> add_fill_views(std::vector<ViewWeight> const& main, std::vector<Vector3d> const& directions,
-                                       Vector3d const& eye, int fill_views) {
-  if (fill_views <= 0) return main;
-  std::vector<double> weights(directions.size(), 0.0);
-  for (auto const& view : main) weights[view.view] = view.weight;
+std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main, std::vector<Vector3d> const& directions,
+                                     Vector3d const& eye, int fill_views) {
+  std::vector<UsedView> all(directions.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].view = i;
+  for (auto const& view : main) all[view.view].weight = view.weight;
 
-  struct Near {
-    double angle;
-    std::size_t view;
-    bool operator<(Near const& other) const { return angle != other.angle ? angle < other.angle : view < other.view; }
-  };
-  std::vector<Near> nearest;
-  for (std::size_t i = 0; i < directions.size(); ++i) {
-    Vector3d const direction = directions[i].normalized();
-    nearest.push_back({std::atan2(direction.cross(eye).norm(), direction.dot(eye)), i});
-  }
-  std::sort(nearest.begin(), nearest.end());
-  std::size_t const count =
-      std::min(nearest.size(), static_cast<std::size_t>(3) + static_cast<std::size_t>(fill_views));
-  // A little beyond the antipode where no view is left out: every view then has some weight.
-  double const horizon = count < nearest.size() ? nearest[count].angle : 1.01 * std::numbers::pi;
-  if (horizon > 0) {
-    for (std::size_t i = 0; i < count; ++i) {
-      weights[nearest[i].view] += kFaintWeight * (1 - nearest[i].angle / horizon);
+  if (fill_views > 0) {
+    struct Near {
+      double angle;
+      std::size_t view;
+      bool operator<(Near const& other) const { return angle != other.angle ? angle < other.angle : view < other.view; }
+    };
+    std::vector<Near> nearest;
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      Vector3d const direction = directions[i].normalized();
+      nearest.push_back({std::atan2(direction.cross(eye).norm(), direction.dot(eye)), i});
     }
+    std::sort(nearest.begin(), nearest.end());
+    std::size_t const count = std::min(nearest.size(), 3 + static_cast<std::size_t>(fill_views));
+    // A little beyond the antipode where no view is left out: every view then fills a little.
+    double const horizon = count < nearest.size() ? nearest[count].angle : 1.01 * std::numbers::pi;
+    for (std::size_t i = 0; i < count && horizon > 0; ++i) all[nearest[i].view].fill = 1 - nearest[i].angle / horizon;
   }
-  std::vector<ViewWeight> result;
-  double sum = 0;
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    if (weights[i] <= 0) continue;
-    result.push_back({i, weights[i]});
-    sum += weights[i];
-  }
-  for (auto& view : result) view.weight /= sum;
-  return result;
+  std::erase_if(all, [](UsedView const& view) { return view.weight <= 0 && view.fill <= 0; });
+  return all;
 }
 
 }  // namespace scanview

@@ -12,13 +12,19 @@ namespace scanview {
 Eigen::Vector3d direction_to_eye(Camera const& camera, Eigen::Isometry3d const& object_from_camera,
                                  Eigen::Vector3d const& center);
 
-/// Adds a faint weight to the `3 + fill_views` views nearest to the eye, so that they show where no main view has a
-/// sample: kFaintWeight · (1 − angle / angle of the nearest view left out). It reaches zero where a view leaves the
-/// nearest, so nothing pops. `directions` are those the sphere was made of. fill_views = 0: `main` as it is.
-/// Ordered by view.
-inline constexpr double kFaintWeight = 1e-3;
-std::vector<ViewWeight> add_fill_views(std::vector<ViewWeight> const& main,
-                                       std::vector<Eigen::Vector3d> const& directions, Eigen::Vector3d const& eye,
-                                       int fill_views);
+/// A view that is drawn: `weight` is its share in the mixture (ViewSphere; 0 for a view that only fills), `fill` how
+/// much it counts where the views with weight have no good sample.
+struct UsedView {
+  std::size_t view = 0;
+  double weight = 0;
+  double fill = 0;
+};
+
+/// Adds the `3 + fill_views` views nearest to the eye as views that fill: fill = 1 − angle / angle of the nearest view
+/// left out. It reaches zero where a view leaves the nearest, so nothing pops. `directions` are those the sphere was
+/// made of. fill_views = 0: `main` as it is, with no fill. Ordered by view.
+std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main,
+                                     std::vector<Eigen::Vector3d> const& directions, Eigen::Vector3d const& eye,
+                                     int fill_views);
 
 }  // namespace scanview

@@ -67,22 +67,21 @@ class OpenGlRenderer final : public ViewBasedRenderer {
     used_directions_ = std::move(directions);
   }
 
-  std::vector<ViewWeight> view_weights(Camera const& camera,
-                                       Eigen::Isometry3d const& object_from_camera) const override {
+  std::vector<UsedView> view_weights(Camera const& camera, Eigen::Isometry3d const& object_from_camera) const override {
     Eigen::Vector3d const eye = direction_to_eye(camera, object_from_camera, center_);
-    auto weights = add_fill_views(sphere_->weights(eye), used_directions_, eye, options_.fill_views);
+    auto views = add_fill_views(sphere_->weights(eye), used_directions_, eye, options_.fill_views);
     // Only where very many views share one direction.
-    if (weights.size() > static_cast<std::size_t>(SoftZCompositor::kMaxLayers)) {
-      std::stable_sort(weights.begin(), weights.end(),
-                       [](ViewWeight const& a, ViewWeight const& b) { return a.weight > b.weight; });
-      weights.resize(SoftZCompositor::kMaxLayers);
-      std::sort(weights.begin(), weights.end(),
-                [](ViewWeight const& a, ViewWeight const& b) { return a.view < b.view; });
+    if (views.size() > static_cast<std::size_t>(SoftZCompositor::kMaxLayers)) {
+      std::stable_sort(views.begin(), views.end(), [](UsedView const& a, UsedView const& b) {
+        return a.weight != b.weight ? a.weight > b.weight : a.fill > b.fill;
+      });
+      views.resize(SoftZCompositor::kMaxLayers);
+      std::sort(views.begin(), views.end(), [](UsedView const& a, UsedView const& b) { return a.view < b.view; });
     }
     double sum = 0;
-    for (auto const& view : weights) sum += view.weight;
-    for (auto& view : weights) view = {used_[view.view], view.weight / sum};
-    return weights;
+    for (auto const& view : views) sum += view.weight;
+    for (auto& view : views) view = {used_[view.view], view.weight / sum, view.fill};
+    return views;
   }
 
   Frame render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) override {
@@ -90,16 +89,16 @@ class OpenGlRenderer final : public ViewBasedRenderer {
       throw Error(ErrorCode::bad_input, {}, "rendering needs a camera with pixels and a finite pose");
     }
     context_.make_current();
-    std::vector<ViewWeight> drawn;
+    std::vector<UsedView> drawn;
     for (auto const& view : view_weights(camera, object_from_camera)) {
       if (ViewPass::in_front(gpu_->views[view.view], camera, object_from_camera)) drawn.push_back(view);
     }
     gpu_->targets.resize(camera.width(), camera.height(), std::max<int>(1, static_cast<int>(drawn.size())));
-    std::vector<double> weights;
+    std::vector<LayerWeight> weights;
     for (auto const& view : drawn) {
       gpu_->targets.begin_layer(static_cast<int>(weights.size()));
       gpu_->pass.draw(gpu_->views[view.view], camera, object_from_camera);
-      weights.push_back(view.weight);
+      weights.push_back({view.weight, view.fill});
     }
     return gpu_->compositor.compose(gpu_->targets, weights, options_.threshold, options_.reliability_ratio);
   }

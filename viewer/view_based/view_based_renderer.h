@@ -6,7 +6,7 @@
 #include "mesh/view_mesh.h"
 #include "viewer/gl/gl_context.h"
 #include "viewer/renderer.h"
-#include "viewer/select/view_sphere.h"
+#include "viewer/select/view_selection.h"
 
 namespace scanview {
 
@@ -17,7 +17,7 @@ struct ViewBasedOptions {
   /// A sample whose weight is below this share of one further away does not hide it (Pulli 1997: "a low confidence
   /// pixel in front of a high confidence one is ignored").
   double reliability_ratio = 0.1;
-  /// Views beyond the three whose faint weight fills what these do not see; 0: the paper's three only. At most 16.
+  /// Views beyond the three that fill what these do not see (SoftZCompositor); 0: the paper's three only. At most 16.
   int fill_views = 4;
   /// Views that are not used (held out).
   std::vector<std::size_t> excluded;
@@ -28,9 +28,9 @@ class ViewBasedRenderer : public Renderer {
  public:
   /// Other views are held out from now on; cheap. Throws Error{bad_input} where no view with triangles remains.
   virtual void exclude(std::vector<std::size_t> const& views) = 0;
-  /// The views that render() would mix for this camera, before pixel weights; ordered by view, summing to 1.
-  virtual std::vector<ViewWeight> view_weights(Camera const& camera,
-                                               Eigen::Isometry3d const& object_from_camera) const = 0;
+  /// The views that render() would draw for this camera; ordered by view, the weights summing to 1.
+  virtual std::vector<UsedView> view_weights(Camera const& camera,
+                                             Eigen::Isometry3d const& object_from_camera) const = 0;
 };
 
 /// The paper's renderer: the views around the eye, blended with w = w_barycentric · w_cos · w_feather under soft
