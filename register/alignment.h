@@ -15,35 +15,35 @@ struct RegisterOptions {
   /// `turntable`: axis direction in the first camera's coordinates; zero: fitted.
   Eigen::Vector3d turntable_axis{0, 0, 0};
   bool refine = true;
-  int levels = 4;                  ///< of the pyramid, coarse to fine
-  int max_iterations = 30;         ///< joint refinements with fresh correspondences
-  double min_overlap = 0.1;        ///< share of a view's depths that another view sees: pairs below are not used
+  int levels = 4;            ///< of the pyramid, coarse to fine
+  int max_iterations = 30;   ///< joint refinements with fresh correspondences
+  double min_overlap = 0.1;  ///< share of a view's depths that another view sees: pairs below are not used
   void validate() const;
 };
 
 /// Two views that overlap, at the final poses.
 struct PairFigures {
-  std::size_t a = 0, b = 0;        ///< indices of views
-  double overlap = 0;              ///< share of a's depths with a correspondence in b
-  double rms = 0;                  ///< point-to-plane, units
-  double median_distance = 0;      ///< point-to-plane absolute, units
-  double inliers = 0;              ///< share of correspondences within 3 robust sigma
-  bool suspicious = false;         ///< a warning was given
+  std::size_t a = 0, b = 0;    ///< indices of views
+  double overlap = 0;          ///< share of a's depths with a correspondence in b
+  double rms = 0;              ///< point-to-plane, units
+  double median_distance = 0;  ///< point-to-plane absolute, units
+  double inliers = 0;          ///< share of correspondences within 3 robust sigma
+  bool suspicious = false;     ///< a warning was given
 };
 
 struct PoseFigures {
-  double std_deg = 0, std_length = 0;   ///< one standard deviation, at the view's centroid
+  double std_deg = 0, std_length = 0;  ///< one standard deviation, at the view's centroid
 };
 
 enum class AlignmentStatus { converged, not_converged, disconnected };
 
 struct Alignment {
-  std::vector<Eigen::Isometry3d> object_from_camera;   ///< a view each; the first view keeps its pose
+  std::vector<Eigen::Isometry3d> object_from_camera;  ///< a view each; the first view keeps its pose
   std::vector<PairFigures> pairs;
   std::vector<PoseFigures> poses;
-  std::vector<std::vector<std::size_t>> parts;          ///< connected parts of the overlap graph, largest first
-  std::vector<std::string> unobservable;                ///< motions the data does not constrain, in words
-  ErrorPart error;                                      ///< distance between overlapping surfaces (error budget)
+  std::vector<std::vector<std::size_t>> parts;  ///< connected parts of the overlap graph, largest first
+  std::vector<std::string> unobservable;        ///< motions the data does not constrain, in words
+  ErrorPart error;                              ///< distance between overlapping surfaces (error budget)
   AlignmentStatus status = AlignmentStatus::converged;
   int iterations = 0;
 };

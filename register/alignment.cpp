@@ -1,0 +1,326 @@
+#include "register/alignment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "register/alignment_figures.h"
+#include "register/joint_refinement.h"
+#include "register/pairwise_start.h"
+#include "register/turntable.h"
+#include "register/view_graph.h"
+
+namespace scanview {
+namespace {
+
+constexpr double kMinScale = 1e-3;  // of residuals, in sigmas: views may agree perfectly
+constexpr double kMinToneScale = 5e-3;
+
+// What one linearisation measured over all pairs; the next one weighs by it.
+struct Scales {
+  double geometry = 0, tone = 0;  // 0: not measured yet
+  double geometry_share = 1, tone_share = 1;
+  double distance = 0;  // robust standard deviation, units
+};
+
+class Aligner {
+ public:
+  Aligner(ScanSet const& set, RegisterOptions const& options, Context& context)
+      : set_(set), options_(options), context_(context) {}
+
+  Alignment run() {
+    prepare();
+    initial_poses();
+    if (options_.refine && set_.views.size() > 1) {
+      start_from_neighbours();
+      refine();
+    } else {
+      update_graph(0, 0.1 * radius_);
+      problem_.fixed = fixed_views();
+    }
+    figures();
+    return result_;
+  }
+
+ private:
+  ScanSet const& set_;
+  RegisterOptions const& options_;
+  Context& context_;
+  std::vector<SurfacePyramid> views_;
+  double radius_ = 1;
+  std::size_t coarsest_ = 0;
+  JointProblem problem_;
+  ViewGraph graph_;
+  Scales scales_;
+  Alignment result_;
+
+  ViewSurface const& surface(std::size_t view, std::size_t level) const {
+    return views_[view].levels[std::min(level, views_[view].levels.size() - 1)];
+  }
+
+  void prepare() {
+    views_.resize(set_.views.size());
+    for_each_index(
+        context_, views_.size(),
+        [&](std::size_t i) {
+          views_[i] = build_pyramid(set_.views[i].image, {options_.levels, 12000});
+        },
+        "register: surfaces");
+    std::vector<double> radii;
+    for (SurfacePyramid const& view : views_) {
+      problem_.centroids.push_back(view.centroid);
+      coarsest_ = std::max(coarsest_, view.levels.size() - 1);
+      if (view.radius > 0) radii.push_back(view.radius);
+    }
+    if (radii.empty()) throw Error(ErrorCode::bad_input, {}, "no view has depths to register");
+    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2), radii.end());
+    radius_ = radii[radii.size() / 2];
+    problem_.radius = radius_;
+  }
+
+  void initial_poses() {
+    auto& poses = problem_.object_from_camera;
+    switch (options_.init) {
+      case RegisterOptions::Init::given:
+        for (View const& view : set_.views) {
+          if (!view.object_from_camera)
+            throw Error(ErrorCode::bad_input, {}, "view " + view.name + " has no pose to start from");
+          poses.push_back(*view.object_from_camera);
+        }
+        break;
+      case RegisterOptions::Init::none:
+        poses.assign(set_.views.size(), Eigen::Isometry3d::Identity());
+        break;
+      case RegisterOptions::Init::turntable: {
+        Turntable const table =
+            fit_turntable(views_, {options_.turntable_step_deg, options_.turntable_axis, radius_}, context_);
+        context_.log(fmt::format("turntable: step {:.3f} deg about ({:.3f}, {:.3f}, {:.3f}), cost {:.3f}",
+                                 table.step_deg, table.axis.x(), table.axis.y(), table.axis.z(), table.cost));
+        poses = table.object_from_camera(set_.views.size());
+        break;
+      }
+    }
+  }
+
+  void update_graph(std::size_t level, double gate) {
+    std::vector<ViewSurface const*> surfaces;
+    for (std::size_t i = 0; i < views_.size(); ++i) surfaces.push_back(&surface(i, level));
+    MatchOptions match;
+    match.gate = gate;
+    match.radius = radius_;
+    match.max_samples = 3000;
+    graph_ = build_view_graph(surfaces, problem_.object_from_camera, options_.min_overlap, match, context_);
+  }
+
+  // The first view of every part stays.
+  std::vector<bool> fixed_views() const {
+    std::vector<bool> fixed(views_.size(), false);
+    for (auto const& part : graph_.parts) fixed[part.front()] = true;
+    return fixed;
+  }
+
+  void start_from_neighbours() {
+    for (int round = 0; round < 2; ++round) {
+      update_graph(std::min<std::size_t>(1, coarsest_), (round == 0 ? 0.25 : 0.1) * radius_);
+      std::vector<ViewGraphEdge> edges = graph_.edges;
+      // Views taken one after the other are neighbours even where rough poses tear them apart.
+      for (std::size_t i = 0; i + 1 < views_.size(); ++i) {
+        bool const there =
+            std::any_of(edges.begin(), edges.end(), [&](ViewGraphEdge const& e) { return e.a == i && e.b == i + 1; });
+        if (!there && options_.init != RegisterOptions::Init::given && views_[i].depths && views_[i + 1].depths)
+          edges.push_back({i, i + 1, 0, 0});
+      }
+      if (edges.empty()) return;
+      graph_.parts = connected_parts(views_.size(), edges);
+      problem_.fixed = fixed_views();
+      problem_.object_from_camera = start_from_pairs(set_, views_, edges, problem_, context_);
+      if (options_.init == RegisterOptions::Init::given) return;
+    }
+  }
+
+  // All pairs matched at the present poses; measures the scales for the next time.
+  std::vector<PairForm> match_all(std::size_t level, double gate) {
+    MatchOptions match;
+    match.gate = gate;
+    match.radius = radius_;
+    match.min_normal_cos = level > 0 ? 0.6 : 0.7;
+    match.max_samples = level > 0 ? 3000 : 6000;
+    if (scales_.geometry > 0) match.geometry_scale = scales_.geometry;
+    if (scales_.tone > 0) match.tone_scale = scales_.tone;
+    match.geometry_share = scales_.geometry_share;
+    match.tone_share = scales_.tone_share;
+    std::vector<PairForm> forms(graph_.edges.size());
+    for_each_index(context_, forms.size(), [&](std::size_t e) {
+      ViewGraphEdge const& edge = graph_.edges[e];
+      Eigen::Isometry3d const b_from_a =
+          problem_.object_from_camera[edge.b].inverse() * problem_.object_from_camera[edge.a];
+      forms[e] = match_pair(surface(edge.a, level), surface(edge.b, level), b_from_a, views_[edge.a].centroid,
+                            views_[edge.b].centroid, match);
+    });
+    ResidualFigures geometry, tone;
+    std::vector<float> distances;
+    auto const append = [](ResidualFigures& all, ResidualFigures const& one) {
+      all.values.insert(all.values.end(), one.values.begin(), one.values.end());
+      all.product += one.product;
+      all.square += one.square;
+    };
+    for (PairForm const& form : forms) {
+      append(geometry, form.geometry);
+      if (form.tone_correlation > 0.2) append(tone, form.tone);
+      distances.insert(distances.end(), form.distances.begin(), form.distances.end());
+    }
+    scales_.geometry = std::max(kMinScale, robust_scale(geometry.values));
+    scales_.geometry_share = effective_share(geometry.correlation());
+    scales_.tone = tone.values.empty() ? 0 : std::max(kMinToneScale, robust_scale(tone.values));
+    scales_.tone_share = effective_share(tone.correlation());
+    scales_.distance = robust_scale(distances);
+    return forms;
+  }
+
+  void set_pairs(std::vector<PairForm> const& forms) {
+    problem_.pairs.clear();
+    for (std::size_t e = 0; e < forms.size(); ++e) {
+      ViewGraphEdge const& edge = graph_.edges[e];
+      problem_.pairs.push_back({edge.a, edge.b,
+                                problem_.object_from_camera[edge.b].inverse() * problem_.object_from_camera[edge.a],
+                                forms[e].information, forms[e].gradient, forms[e].center});
+    }
+  }
+
+  double median_pixel(std::size_t level) const {
+    std::vector<double> sizes;
+    for (std::size_t i = 0; i < views_.size(); ++i)
+      if (views_[i].depths > 0) sizes.push_back(surface(i, level).camera.pixel_size(views_[i].centroid.z()));
+    std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2), sizes.end());
+    return sizes[sizes.size() / 2];
+  }
+
+  void refine() {
+    double gate = 0.1 * radius_;
+    result_.status = AlignmentStatus::not_converged;
+    for (std::size_t level = coarsest_ + 1; level-- > 0;) {
+      double const pixel = median_pixel(level);
+      int const rounds = level > 0 ? std::max(2, options_.max_iterations / 5) : options_.max_iterations;
+      scales_ = {};
+      for (int round = 0; round < rounds && result_.iterations < options_.max_iterations; ++round) {
+        context_.check_cancelled();
+        if (round % 4 == 0) {
+          update_graph(std::max<std::size_t>(level, std::min<std::size_t>(1, coarsest_)), gate);
+          problem_.fixed = fixed_views();
+          if (graph_.edges.empty()) return;
+        }
+        if (round == 0) match_all(level, gate);  // the scales
+        gate = std::clamp(5 * scales_.distance, std::min(gate, 1.5 * pixel), gate);
+        set_pairs(match_all(level, gate));
+        JointStep const step = solve_joint(problem_, joint_spectrum(problem_), PairLoss::quadratic);
+        problem_.object_from_camera = step.object_from_camera;
+        ++result_.iterations;
+        context_.progress("register: refine", static_cast<std::size_t>(result_.iterations),
+                          static_cast<std::size_t>(options_.max_iterations));
+        bool const settled = step.largest < (level > 0 ? 0.1 : 0.02) * pixel;
+        if (settled && level == 0) result_.status = AlignmentStatus::converged;
+        if (settled) break;
+      }
+    }
+  }
+
+  std::string name(std::size_t view) const { return set_.views[view].name; }
+
+  void figures() {
+    double const gate = std::max(0.05 * radius_, 5 * scales_.distance);
+    update_graph(0, gate);
+    result_.object_from_camera = problem_.object_from_camera;
+    result_.parts = graph_.parts;
+    problem_.fixed = fixed_views();
+    match_all(0, gate);
+    std::vector<PairForm> const forms = match_all(0, std::clamp(5 * scales_.distance, 1.5 * median_pixel(0), gate));
+    set_pairs(forms);
+    JointSpectrum const spectrum = joint_spectrum(problem_);
+    std::vector<std::string> names;
+    for (View const& view : set_.views) names.push_back(view.name);
+    result_.unobservable = describe_free_motions(problem_, spectrum, names);
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      auto const at = static_cast<Eigen::Index>(6 * i);
+      PoseFigures pose;
+      pose.std_deg = std::sqrt(std::max(0.0, spectrum.covariance.block<3, 3>(at, at).trace())) / radius_ * 180 /
+                     3.14159265358979323846;
+      pose.std_length = std::sqrt(std::max(0.0, spectrum.covariance.block<3, 3>(at + 3, at + 3).trace()));
+      result_.poses.push_back(pose);
+    }
+    std::vector<PairDistances> const pairs =
+        measure_pairs(set_, views_, graph_.edges, problem_.object_from_camera, gate, context_);
+    result_.error = overall_error(pairs);
+    for (PairDistances const& pair : pairs) result_.pairs.push_back(pair.figures);
+    judge_pairs(forms);
+    judge_parts();
+  }
+
+  // A pair is suspicious whose residual, or whose wish to move against what all pairs agreed on, is far above the
+  // others'.
+  void judge_pairs(std::vector<PairForm> const& forms) {
+    if (forms.size() < 3) return;
+    std::vector<double> residuals, wishes;
+    for (std::size_t e = 0; e < forms.size(); ++e) {
+      residuals.push_back(result_.pairs[e].median_distance);
+      Matrix6d information = forms[e].information;
+      information.diagonal().array() += 1e-4 * information.trace() + 1e-300;
+      wishes.push_back(information.ldlt().solve(forms[e].gradient).norm());
+    }
+    auto const median = [](std::vector<double> values) {
+      auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), middle, values.end());
+      return *middle;
+    };
+    double const usual_residual = median(residuals), usual_wish = median(wishes);
+    for (std::size_t e = 0; e < forms.size(); ++e) {
+      PairFigures& pair = result_.pairs[e];
+      bool const far = residuals[e] > 3 * usual_residual && residuals[e] > 1e-3 * radius_;
+      bool const torn = wishes[e] > 6 * usual_wish && wishes[e] > 0.02 * radius_;
+      pair.suspicious = far || torn;
+      if (far)
+        context_.warn(fmt::format("views {} and {} do not fit: median distance {:.3g} {}, of all pairs {:.3g}",
+                                  name(pair.a), name(pair.b), residuals[e], to_string(set_.unit), usual_residual));
+      else if (torn)
+        context_.warn(fmt::format("views {} and {} disagree with the others by {:.3g} {}", name(pair.a), name(pair.b),
+                                  wishes[e], to_string(set_.unit)));
+    }
+  }
+
+  void judge_parts() {
+    if (result_.parts.size() > 1) {
+      result_.status = AlignmentStatus::disconnected;
+      for (std::size_t p = 1; p < result_.parts.size(); ++p) {
+        std::string who;
+        for (std::size_t view : result_.parts[p]) who += (who.empty() ? "" : ", ") + name(view);
+        context_.warn(fmt::format("no overlap joins {} to the other views: kept at the initial poses", who));
+      }
+      return;
+    }
+    for (std::string const& motion : result_.unobservable)
+      context_.warn("the data does not hold " + motion + ": left as it was");
+    if (result_.status == AlignmentStatus::not_converged && options_.refine)
+      context_.warn(fmt::format("registration did not settle in {} iterations", result_.iterations));
+  }
+};
+
+}  // namespace
+
+void RegisterOptions::validate() const {
+  auto const refuse = [](std::string const& why) { throw Error(ErrorCode::usage, {}, why); };
+  if (!std::isfinite(turntable_step_deg) || std::abs(turntable_step_deg) > 180)
+    refuse("turntable step must lie within -180 and 180 degrees");
+  if (!turntable_axis.allFinite()) refuse("turntable axis must be finite");
+  if (levels < 1 || levels > 12) refuse("levels must be 1 to 12");
+  if (max_iterations < 1) refuse("max_iterations must be at least 1");
+  if (!(min_overlap > 0 && min_overlap <= 1)) refuse("min_overlap must lie above 0 and at most at 1");
+}
+
+Alignment align(ScanSet const& set, RegisterOptions const& options, Context& context) {
+  options.validate();
+  return Aligner(set, options, context).run();
+}
+
+}  // namespace scanview

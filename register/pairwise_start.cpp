@@ -1,0 +1,134 @@
+#include "register/pairwise_start.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "register/feature_match.h"
+#include "register/pairwise_icp.h"
+
+namespace scanview {
+namespace {
+
+constexpr double kPairAccuracy = 0.01;  // of the radius: what a pairwise motion may be off
+
+ViewSurface const& level_of(SurfacePyramid const& view, std::size_t level) {
+  return view.levels[std::min(level, view.levels.size() - 1)];
+}
+
+MatchOptions cost_options(double radius) {
+  MatchOptions options;
+  options.radius = radius;
+  options.gate = 0.06 * radius;
+  options.max_samples = 1500;
+  return options;
+}
+
+double cost_at(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d const& b_from_a,
+               MatchOptions const& options) {
+  return match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options).cost;
+}
+
+// A few Gauss-Newton steps of one pair alone by projection, shape and tone.
+Eigen::Isometry3d polish(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d b_from_a,
+                         MatchOptions options) {
+  for (int i = 0; i < 6; ++i) {
+    PairForm form = match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options);
+    if (form.hits_ab + form.hits_ba < 50) break;
+    // Scales of this pair, for the next step.
+    options.geometry_scale = std::max(0.05, robust_scale(form.geometry.values));
+    if (!form.tone.values.empty()) options.tone_scale = std::max(0.01, robust_scale(form.tone.values));
+    options.geometry_share = effective_share(form.geometry.correlation());
+    options.tone_share = effective_share(form.tone.correlation());
+    form.information.diagonal().array() += 1e-6 * form.information.trace() + 1e-12;
+    Vector6d const step = -form.information.ldlt().solve(form.gradient);
+    if (!step.allFinite() || step.norm() > 0.2 * options.radius) break;
+    b_from_a = motion(step, form.center, options.radius) * b_from_a;
+  }
+  return b_from_a;
+}
+
+PairMeasurement measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features const& features_a,
+                             Features const& features_b, Eigen::Isometry3d const& start, ViewGraphEdge const& edge,
+                             double radius, std::uint64_t seed, std::size_t views) {
+  MatchOptions const options = cost_options(radius);
+  std::vector<Eigen::Isometry3d> candidates{start};
+  IcpOptions icp;
+  icp.radius = radius;
+  ViewSurface const &coarse_a = level_of(a, 2), &coarse_b = level_of(b, 2);
+  candidates.push_back(pairwise_icp(coarse_a, coarse_b, start, icp).b_from_a);
+  FeatureMotionOptions feature_options;
+  feature_options.threshold = 0.02 * radius;
+  feature_options.seed = seed;
+  feature_options.item = edge.a * views + edge.b;
+  FeatureMotion const by_features = match_features(features_a, features_b, feature_options);
+  if (by_features.found) {
+    candidates.push_back(by_features.b_from_a);
+    icp.first_distance = 0.1;
+    candidates.push_back(pairwise_icp(coarse_a, coarse_b, by_features.b_from_a, icp).b_from_a);
+  }
+  std::size_t const plain = candidates.size();
+  for (std::size_t k = 0; k < plain; ++k) candidates.push_back(polish(a, b, candidates[k], options));
+  PairMeasurement best{edge.a, edge.b, start, Matrix6d::Zero(), Vector6d::Zero(), Eigen::Vector3d::Zero()};
+  double least = 2;
+  for (Eigen::Isometry3d const& candidate : candidates) {
+    double const cost = cost_at(a, b, candidate, options);
+    if (cost >= least) continue;
+    least = cost;
+    best.b_from_a = candidate;
+  }
+  // How firmly shape and tone hold it there, as a mean form, so that strong and weak pairs differ by direction, not by
+  // the number of their pixels.
+  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), best.b_from_a, a.centroid, b.centroid, options);
+  best.center = form.center;
+  double const trace = form.information.trace();
+  if (trace > 0 && form.hits_ab + form.hits_ba >= 30)
+    best.information = form.information * (6 / trace) / std::pow(kPairAccuracy * radius, 2);
+  return best;
+}
+
+}  // namespace
+
+double mean_pair_cost(std::vector<SurfacePyramid> const& views, std::vector<ViewGraphEdge> const& edges,
+                      std::vector<Eigen::Isometry3d> const& poses, double radius, Context& context) {
+  std::vector<double> costs(edges.size());
+  MatchOptions const options = cost_options(radius);
+  for_each_index(context, edges.size(), [&](std::size_t e) {
+    ViewGraphEdge const& edge = edges[e];
+    costs[e] = cost_at(views[edge.a], views[edge.b], poses[edge.b].inverse() * poses[edge.a], options);
+  });
+  double sum = 0;
+  for (double cost : costs) sum += cost;
+  return costs.empty() ? 1 : sum / static_cast<double>(costs.size());
+}
+
+std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<SurfacePyramid> const& views,
+                                                std::vector<ViewGraphEdge> const& edges, JointProblem const& start,
+                                                Context& context) {
+  std::size_t const n = views.size();
+  std::vector<Features> features(n);
+  for_each_index(context, n, [&](std::size_t i) {
+    if (views[i].depths > 0 && !views[i].levels[0].tone.empty())
+      features[i] = find_features(set.views[i].image, views[i].levels[0]);
+  });
+  JointProblem problem = start;
+  problem.pairs.resize(edges.size());
+  for_each_index(
+      context, edges.size(),
+      [&](std::size_t e) {
+        ViewGraphEdge const& edge = edges[e];
+        Eigen::Isometry3d const b_from_a =
+            start.object_from_camera[edge.b].inverse() * start.object_from_camera[edge.a];
+        problem.pairs[e] = measure_pair(views[edge.a], views[edge.b], features[edge.a], features[edge.b], b_from_a,
+                                        edge, problem.radius, context.seed, n);
+      },
+      "register: pairs");
+  JointSpectrum const spectrum = joint_spectrum(problem);
+  JointStep const balanced = solve_joint(problem, spectrum, PairLoss::cauchy);
+  double const before = mean_pair_cost(views, edges, start.object_from_camera, problem.radius, context);
+  double const after = mean_pair_cost(views, edges, balanced.object_from_camera, problem.radius, context);
+  context.log("pairwise start: mean cost " + std::to_string(before) + " -> " + std::to_string(after));
+  return after < before ? balanced.object_from_camera : start.object_from_camera;
+}
+
+}  // namespace scanview
