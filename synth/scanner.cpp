@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "base/srgb.h"
 #include "synth/ray_scene.h"
 #include "synth/surface_light.h"
 
@@ -166,8 +167,9 @@ class ViewScan {
 
 /// What no ray hits, linear R G B.
 Vector3f background() {
-  static Vector3f const color(linear_from_srgb(96 / 255.0f), linear_from_srgb(110 / 255.0f),
-                              linear_from_srgb(128 / 255.0f));
+  static Vector3f const color =
+      Vector3d(linear_from_srgb(96 / 255.0), linear_from_srgb(110 / 255.0), linear_from_srgb(128 / 255.0))
+          .cast<float>();
   return color;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/parallel.h"
+#include "base/srgb.h"
 
 namespace scanview {
 namespace {
@@ -85,14 +86,6 @@ Vector3f irradiance(Vector3f const& position, Vector3f const& normal, std::vecto
 
 }  // namespace
 
-float linear_from_srgb(float srgb) {
-  return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f);
-}
-
-float srgb_from_linear(float linear) {
-  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
-}
-
 SurfaceLight::SurfaceLight(std::vector<Vector3f> const& vertices, std::vector<Vector3i> const& triangles,
                            std::vector<cv::Vec3b> const& colors)
     : vertices_(vertices), triangles_(triangles), colors_(colors), corners_(triangles) {
@@ -147,7 +140,7 @@ void SurfaceLight::mark_seen(int triangle, Vector3f const& direction) {
 void SurfaceLight::light(RayScene const& scene, float radius, Context& context) {
   std::vector<Source> const sources = light_sources();
   std::array<float, 256> linear;
-  for (int i = 0; i < 256; ++i) linear[i] = linear_from_srgb(static_cast<float>(i) / 255.0f);
+  for (int i = 0; i < 256; ++i) linear[i] = static_cast<float>(linear_from_srgb(i / 255.0));
   auto const light_chunk = [&](std::size_t chunk) {
     std::size_t const end = std::min(points_.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {

@@ -51,8 +51,4 @@ class SurfaceLight {
   std::array<std::vector<Eigen::Vector3f>, 2> light_;   // a side: of each point
 };
 
-/// sRGB (IEC 61966-2-1) to linear light and back, both in [0, 1].
-float linear_from_srgb(float srgb);
-float srgb_from_linear(float linear);
-
 }  // namespace scanview
