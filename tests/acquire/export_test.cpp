@@ -330,7 +330,7 @@ TEST(Export, ReplacesAnEarlierExportButNoOtherFolder) {
   TemporaryFolder folder;
   Context context;
   ScanSet set = make_set();
-  for (auto const& [name, run] : {std::pair("colmap", export_colmap), std::pair("nerf", export_nerfstudio)}) {
+  for (auto const& [name, run] : {std::pair("colmap", &export_colmap), std::pair("nerf", &export_nerfstudio)}) {
     fs::path const out = folder.path() / name;
     fs::create_directory(out);
     set = make_set();
