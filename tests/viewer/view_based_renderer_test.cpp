@@ -62,8 +62,9 @@ TEST(ViewBasedRenderer, ReproducesThePhotographAtASourceCamera) {
     cv::Mat1b const object = view.image.classes == 255;
     cv::Mat1b const drawn = drawn_mask(frame);
     // Texel centres fall on pixel centres: what is left is rounding to 8 bits (at most 1: 48 dB).
-    EXPECT_GT(psnr(bgr(frame.color), view.image.color, drawn & object), 48);
-    // All but the outline's own pixels, which the grid's triangles reach but do not cover.
+    // On the rim itself, which the triangles reach but do not always cover, other views may fill.
+    EXPECT_GT(psnr(bgr(frame.color), view.image.color, drawn & (mesh.feather > 0)), 48);
+    EXPECT_GT(psnr(bgr(frame.color), view.image.color, drawn & object), 38);
     EXPECT_GT(cv::countNonZero(drawn & object), 0.95 * cv::countNonZero(object));
     EXPECT_EQ(cv::countNonZero(drawn & ~object), 0);
     for (int y = 0; y < object.rows; ++y) {
@@ -83,7 +84,8 @@ TEST(ViewBasedRenderer, ReproducesAnOrthographicPhotograph) {
   // A range image may start anywhere along the axis: depths here run from -1 to 0.
   auto const scene = scan(sphere(Vector3d::Zero(), 1), camera, {around(30, 20, 4), around(150, 0, 4)}, 0.3, 0.02);
   auto const frame = draw(scene, camera, *scene.set.views[0].object_from_camera);
-  EXPECT_GT(psnr(bgr(frame.color), scene.set.views[0].image.color, drawn_mask(frame)), 48);
+  EXPECT_GT(psnr(bgr(frame.color), scene.set.views[0].image.color, drawn_mask(frame) & (scene.meshes[0].feather > 0)),
+            48);
 }
 
 TEST(ViewBasedRenderer, OrthographicDepthsMayBeNegative) {
@@ -322,12 +324,12 @@ TEST(ViewBasedRenderer, MovingTheEyeALittleChangesThePictureALittle) {
   // change by at most about 25 of 255 a pixel: below 1 a step, plus 1 of rounding. A view that pops would change a
   // region.
   for (auto const& axis : {Vector3d(0.1, 1, 0), Vector3d(1, 0.1, 0.2)}) {
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < 20; ++i) {
       auto const turned = [&](double degrees) {
         return Isometry3d(Eigen::AngleAxisd(degrees * kDegree, axis.normalized())) * around(5, 10);
       };
-      auto const a = renderer->render(small_camera(), turned(9 * i));
-      auto const b = renderer->render(small_camera(), turned(9 * i + 0.02));
+      auto const a = renderer->render(small_camera(), turned(18 * i));
+      auto const b = renderer->render(small_camera(), turned(18 * i + 0.02));
       int worse = 0;
       for (int y = 0; y < a.color.rows; ++y) {
         for (int x = 0; x < a.color.cols; ++x) {

@@ -51,7 +51,7 @@ void main() {
     if (q > 0.0) {
       quality[count] = q;
       layer[count++] = i;
-      good += layer_weight[i] * min(1.0, 0.3 + q / 0.1);
+      good += layer_weight[i] * min(1.0, 0.35 + q / 0.1);
     }
   }
   float need = clamp(1.0 - good / 0.3, 0.0, 1.0);

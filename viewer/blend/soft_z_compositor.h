@@ -15,7 +15,7 @@ struct LayerWeight {
 /// Which of several views' samples of a pixel are seen, and how they are mixed (Pulli 1997, soft z-buffering).
 ///
 /// Sample i has depth z and weight w = (weight + s · fill) · q, with q the pixel's weight w_cos · w_feather. s is 1
-/// where the views with weight have no sample, and falls to 0 where sum(weight · min(1, 0.3 + q / 0.1)) reaches 0.3:
+/// where the views with weight have no sample, and falls to 0 where sum(weight · min(1, 0.35 + q / 0.1)) reaches 0.3:
 /// views that fill leave no ghosts where they are not needed, fade in towards the rim of a hole, and never touch a view
 /// that has all the weight.
 ///

@@ -73,7 +73,13 @@ Isometry3d between_poses(Isometry3d const& a, Isometry3d const& b, double t, Vec
   return pose;
 }
 
-Camera fitted(Camera const& camera, int width, int height) {
+void check_size(int width, int height) {
+  if (width < 1 || height < 1) throw Error(ErrorCode::usage, {}, "a picture needs at least one pixel");
+}
+
+}  // namespace
+
+Camera fit_camera(Camera const& camera, int width, int height) {
   double const scale =
       std::min(static_cast<double>(width) / camera.width(), static_cast<double>(height) / camera.height());
   double const cx = (camera.cx() + 0.5) * scale - 0.5 + (width - scale * camera.width()) / 2;
@@ -83,12 +89,6 @@ Camera fitted(Camera const& camera, int width, int height) {
   }
   return Camera::orthographic(width, height, 1 / (camera.fx() * scale), 1 / (camera.fy() * scale), cx, cy);
 }
-
-void check_size(int width, int height) {
-  if (width < 1 || height < 1) throw Error(ErrorCode::usage, {}, "a picture needs at least one pixel");
-}
-
-}  // namespace
 
 Isometry3d look_at(Vector3d const& eye, Vector3d const& target, Vector3d const& up) {
   Vector3d forward = target - eye;
@@ -160,7 +160,7 @@ PathCamera camera_like(ScanSet const& set, std::string const& view_name, int wid
   for (auto const& view : set.views) {
     if (view.name != view_name) continue;
     if (!view.object_from_camera) throw Error(ErrorCode::bad_input, {}, "view " + view_name + " has no pose");
-    return {fitted(view.image.camera, width, height), *view.object_from_camera, view_name};
+    return {fit_camera(view.image.camera, width, height), *view.object_from_camera, view_name};
   }
   throw Error(ErrorCode::usage, {}, "the set has no view named '" + view_name + "'");
 }
@@ -184,7 +184,7 @@ std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int height) 
     View const& first = set.views[a];
     View const& second = set.views[b];
     if (first.image.camera.is_perspective() && second.image.camera.is_perspective()) {
-      path.push_back({fitted(first.image.camera, width, height),
+      path.push_back({fit_camera(first.image.camera, width, height),
                       between_poses(*first.object_from_camera, *second.object_from_camera, 0.5, set.center, frame.up),
                       {}});
     } else {
@@ -223,7 +223,7 @@ std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, Scan
       if (key != "camera" && key != "object_from_camera") refuse(what + ": unknown key '" + key + "'");
     }
     PathCamera key = framing_camera(set, frame, frame.start, width, height);
-    if (entry.contains("camera")) key.camera = fitted(Camera::from_json(entry["camera"], file), width, height);
+    if (entry.contains("camera")) key.camera = fit_camera(Camera::from_json(entry["camera"], file), width, height);
     key.object_from_camera = pose_from_json(entry["object_from_camera"], file, what);
     keys.push_back(std::move(key));
   }

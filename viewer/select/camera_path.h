@@ -38,7 +38,10 @@ PathCamera framing_camera(ScanSet const& set, OrbitFrame const& frame, Eigen::Ve
 /// A full turn about `up` in `count` steps, starting at the first view.
 std::vector<PathCamera> orbit_path(ScanSet const& set, int count, int width, int height);
 
-/// The camera of a view in a picture of another size: whole and undistorted, with margins where the aspects differ.
+/// The same view in a picture of another size: whole and undistorted, with margins where the aspects differ.
+Camera fit_camera(Camera const& camera, int width, int height);
+
+/// The camera of a view in a picture of another size (fit_camera). Throws Error{usage} where there is no such view.
 PathCamera camera_like(ScanSet const& set, std::string const& view_name, int width, int height);
 
 /// Halfway between consecutive views (and between last and first, where that gap is no wider than one and a half times

@@ -1,0 +1,37 @@
+#pragma once
+#include <Eigen/Geometry>
+
+#include "viewer/select/camera_path.h"
+
+namespace scanview {
+
+/// The eye of an interactive window: turns about a pivot, pans, comes nearer. Knows nothing of windows; lengths on the
+/// screen are shares of the window's height, so that dragging feels the same in any size.
+class OrbitControl {
+ public:
+  explicit OrbitControl(ScanSet const& set);
+  PathCamera const& current() const { return current_; }
+
+  void reset();
+  /// About the set's up direction and the camera's horizontal axis; never over the poles. A full height is half a turn.
+  void orbit(double right, double down);
+  /// Moves eye and pivot in the picture's plane so that what is at the pivot's depth follows the pointer.
+  void pan(double right, double down);
+  /// Brings the eye nearer (positive) to the pivot or takes it away, a tenth a step; never through it.
+  void zoom(double steps);
+  /// Degrees about up: what the turntable does.
+  void turn(double degrees);
+  /// The camera of a view: for an orthographic one a perspective camera from the same direction. False where there is
+  /// none of that index.
+  bool jump(std::size_t view);
+
+ private:
+  void rotate(Eigen::AngleAxisd const& rotation);
+
+  ScanSet const& set_;
+  OrbitFrame frame_;
+  PathCamera current_;
+  Eigen::Vector3d pivot_;
+};
+
+}  // namespace scanview
