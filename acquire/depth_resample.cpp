@@ -97,4 +97,25 @@ cv::Mat1f reproject_depth(cv::Mat1f const& depth, Camera const& source, Camera c
   });
 }
 
+void close_seams(cv::Mat1f& depth, Camera const& camera, DepthNoise const& noise) {
+  auto const between = [&](cv::Mat1f const& from, int xa, int ya, int xb, int yb) {
+    double const a = from(ya, xa), b = from(yb, xb);
+    if (!std::isfinite(a) || !std::isfinite(b)) return kMissing;
+    double const sigma = noise.sigma(std::min(a, b));
+    if (std::abs(a - b) > largest_step(camera, std::min(a, b), sigma, sigma, 2)) return kMissing;
+    return static_cast<float>(camera.is_perspective() ? 2 / (1 / a + 1 / b) : (a + b) / 2);
+  };
+  // The second pass closes the crossings of seams.
+  for (int pass = 0; pass < 2; ++pass) {
+    cv::Mat1f const before = depth.clone();
+    for (int y = 0; y < depth.rows; ++y)
+      for (int x = 0; x < depth.cols; ++x) {
+        if (std::isfinite(before(y, x))) continue;
+        if (x > 0 && x + 1 < depth.cols) depth(y, x) = between(before, x - 1, y, x + 1, y);
+        if (y > 0 && y + 1 < depth.rows && !std::isfinite(depth(y, x)))
+          depth(y, x) = between(before, x, y - 1, x, y + 1);
+      }
+  }
+}
+
 }  // namespace scanview

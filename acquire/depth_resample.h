@@ -21,4 +21,9 @@ cv::Mat1f resample_depth(cv::Mat3d const& points, Camera const& camera,
 cv::Mat1f reproject_depth(cv::Mat1f const& depth, Camera const& source, Camera const& target,
                           Eigen::Isometry3d const& target_from_source, DepthNoise const& noise);
 
+/// Closes gaps one pixel wide between depths of one surface (largest_step with the sensor's noise): the seams that
+/// remain where a sensor's own software warped a coarser depth map into the colour picture point by point. 1/z is
+/// interpolated.
+void close_seams(cv::Mat1f& depth, Camera const& camera, DepthNoise const& noise);
+
 }  // namespace scanview

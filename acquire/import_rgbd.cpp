@@ -52,7 +52,8 @@ RawView load(RgbdFrame const& frame, RgbdSource const& source, DepthNoise const&
                                 source.color_from_depth, noise);
   } else {
     check_size(depth, raw.camera, frame.depth);
-    raw.depth = undistort_depth(depth, raw.camera, source.color.lens);
+    raw.depth = undistort_depth(depth, raw.camera, source.color.lens).clone();
+    close_seams(raw.depth, raw.camera, noise);
   }
   return raw;
 }
@@ -81,7 +82,7 @@ ImportResult import_rgbd(std::filesystem::path const& path, ImportOptions const&
   // Where scale is arbitrary the depth of a thousand steps stands for the set until its median is known.
   DepthNoise const first_guess = sensor_noise(source.unit, source.depth_unit, 1000 * source.depth_unit);
   for (auto const& frame : source.frames)
-    plan.views.push_back({frame.name, [&] { return load(frame, source, first_guess); }});
+    plan.views.push_back({frame.name, [&source, &frame, &first_guess] { return load(frame, source, first_guess); }});
   ImportResult result = build_import(plan, options, context);
   result.files_read = source.files;
   for (std::size_t i = 0; i < source.frames.size(); i += static_cast<std::size_t>(options.step)) {
@@ -90,6 +91,7 @@ ImportResult import_rgbd(std::filesystem::path const& path, ImportOptions const&
     result.files_read.push_back(frame.depth);
     if (frame.pose_file) result.files_read.push_back(*frame.pose_file);
   }
+  std::erase_if(result.files_read, [](auto const& file) { return !std::filesystem::is_regular_file(file); });
   return result;
 }
 

@@ -17,6 +17,7 @@ namespace {
 constexpr double kInFront = 3;           // sigmas by which the object stands out
 constexpr double kMostEvidence = 8;      // of one pixel, as a log likelihood ratio: no pixel is certain
 constexpr double kUnsureNearStep = 0.1;  // what a depth is worth next to a step, where matching windows straddle it
+constexpr double kShading = 0.04;        // by which the object's shadow may change the background's brightness
 constexpr int kStepReach = 8;            // pixels
 constexpr double kSmoothness = 6;        // price of a mask border across a pair of equal colours
 
@@ -101,6 +102,15 @@ class ColorModel {
   double objects_ = 0, backgrounds_ = 0;
 };
 
+/// Squared, in standard deviations. Brightness may differ by more than hue does: an object shades what is around it.
+double color_distance(cv::Vec3f const& color, cv::Vec3f const& background, double sigma) {
+  cv::Vec3f const d = color - background;
+  double const length = cv::norm(background);
+  double const along = length > 0 ? d.dot(background) / length : 0;
+  double const shading = kShading * length;
+  return (d.dot(d) - along * along) / (sigma * sigma) + along * along / (sigma * sigma + shading * shading);
+}
+
 /// Log likelihood ratio, object against background, of depth and colour of every pixel.
 cv::Mat1d evidence(BackgroundModel const& model, cv::Mat1f const& ratio, cv::Mat3f const& color) {
   cv::Mat1b const in_front = ratio > kInFront;  // false where NaN
@@ -123,8 +133,7 @@ cv::Mat1d evidence(BackgroundModel const& model, cv::Mat1f const& ratio, cv::Mat
         result(y, x) += depth_evidence(r) * (unsure ? kUnsureNearStep : 1.0);
       }
       if (std::isfinite(model.color_sigma(y, x))) {
-        cv::Vec3f const d = color(y, x) - model.color(y, x);
-        double const squared = d.dot(d) / (model.color_sigma(y, x) * model.color_sigma(y, x));
+        double const squared = color_distance(color(y, x), model.color(y, x), model.color_sigma(y, x));
         result(y, x) += std::clamp((squared - 20) / 4, -5.0, 6.0);
       }
       result(y, x) += colors.evidence(color(y, x));

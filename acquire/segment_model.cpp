@@ -14,7 +14,8 @@ namespace scanview {
 namespace {
 
 constexpr double kClusterSigmas = 3;  // half the width of a cluster of depths
-constexpr double kColorFloor = 4;     // of 255: sensor noise and compression, even where few views say less
+constexpr float kColorFloor = 1.5f;   // of 255: noise that rounding and compression leave in any picture
+constexpr float kSameColor = 3;       // times the colour noise, of one channel: still the same colour
 constexpr int kFitRadius = 6;         // of the window that carries the background on where it is rarely seen
 constexpr int kFewestToFit = 20;
 constexpr double kSmallestSeed = 0.01;  // of the picture; smaller still pieces come back by growing, or are chance
@@ -36,8 +37,9 @@ std::vector<Sighting> sightings(std::vector<RangeImage const*> const& images, in
   return seen;
 }
 
-/// Median of |z - median| / sigma over the pixels where nothing moved, as a standard deviation: noise from view to view
-/// is more than what a plane fitted to one view leaves, since a matching window correlates its pixels.
+/// How depths scatter from view to view where nothing moved, relative to sigma: 90th percentile of |z - median| /
+/// sigma, as if normal. More than what a plane fitted to one view leaves, since a matching window correlates its
+/// pixels.
 double temporal_noise(std::vector<RangeImage const*> const& images) {
   std::vector<float> ratios;
   for (int y = 0; y < images[0]->depth.rows; y += 2)
@@ -50,9 +52,9 @@ double temporal_noise(std::vector<RangeImage const*> const& images) {
         if (s.view != middle.view) ratios.push_back(std::abs(s.depth - middle.depth) / middle.sigma);
     }
   if (ratios.size() < 100) return 1;
-  auto const at = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  auto const at = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() * 9 / 10);
   std::nth_element(ratios.begin(), at, ratios.end());
-  return std::clamp(1.4826 * *at, 0.5, 4.0);
+  return std::clamp(*at / 1.645, 1.0, 4.0);
 }
 
 /// The run of sightings (sorted) that agree, with the most views; the farther of equals.
@@ -69,9 +71,7 @@ std::span<Sighting const> largest_cluster(std::vector<Sighting> const& seen, dou
 
 /// The sightings that agree with a depth that was predicted.
 std::span<Sighting const> cluster_at(std::vector<Sighting> const& seen, double z, double noise_factor) {
-  auto const near = [&](Sighting const& s) {
-    return std::abs(s.depth - z) <= 2 * kClusterSigmas * noise_factor * s.sigma;
-  };
+  auto const near = [&](Sighting const& s) { return std::abs(s.depth - z) <= kClusterSigmas * noise_factor * s.sigma; };
   auto const first = std::find_if(seen.begin(), seen.end(), near);
   auto const last = std::find_if_not(first, seen.end(), near);
   return {first, last};
@@ -194,20 +194,30 @@ class ModelBuilder {
     model_.sigma(y, x) = static_cast<float>(noise_factor_ * middle.sigma);
     linear_(y, x) = to_linear(camera_, middle.depth);
     known_(y, x) = 255;
-    std::vector<float> values;
     float spread = 0;
+    model_.color(y, x) = color_of(x, y, cluster, spread);
+    model_.color_sigma(y, x) = std::hypot(spread, color_noise_);
+  }
+
+  cv::Vec3f matched(std::size_t view, int x, int y) const {
+    cv::Vec3f color;
+    for (int c = 0; c < 3; ++c) color[c] = images_[view]->color(y, x)[c] * gains_[view][c];
+    return color;
+  }
+
+  /// Median over the views of a cluster; `spread` is the largest of the channels', as a standard deviation.
+  cv::Vec3f color_of(int x, int y, std::span<Sighting const> cluster, float& spread) const {
+    cv::Vec3f color;
+    std::vector<float> values;
+    spread = 0;
     for (int c = 0; c < 3; ++c) {
       values.clear();
-      for (auto const& s : cluster) {
-        auto const view = static_cast<std::size_t>(s.view);
-        values.push_back(images_[view]->color(y, x)[c] * gains_[view][c]);
-      }
-      float const middle_color = median(values);
-      model_.color(y, x)[c] = middle_color;
-      for (float& value : values) value = std::abs(value - middle_color);
+      for (auto const& s : cluster) values.push_back(matched(static_cast<std::size_t>(s.view), x, y)[c]);
+      color[c] = median(values);
+      for (float& value : values) value = std::abs(value - color[c]);
       spread = std::max(spread, 1.4826f * median(values));
     }
-    model_.color_sigma(y, x) = static_cast<float>(std::hypot(spread, kColorFloor));
+    return color;
   }
 
   void forget(int x, int y) {
@@ -229,9 +239,16 @@ class ModelBuilder {
     };
     for_still([&](int x, int y, auto const&) { still(y, x) = 255; });
     gains_ = exposure_gains(images_, still);
+    std::vector<float> spreads;
+    for_still([&](int x, int y, auto const& cluster) {
+      float spread = 0;
+      color_of(x, y, cluster, spread);
+      spreads.push_back(spread);
+    });
+    if (!spreads.empty()) color_noise_ = std::max(kColorFloor, median(spreads));
     for_still([&](int x, int y, auto const& cluster) {
       accept(x, y, cluster);
-      if (model_.color_sigma(y, x) > 3 * kColorFloor) forget(x, y);
+      if (model_.color_sigma(y, x) > kSameColor * color_noise_) forget(x, y);
     });
     cv::Mat1i labels;
     cv::Mat stats, centers;
@@ -245,7 +262,8 @@ class ModelBuilder {
   /// From there the background is carried on, plane by plane, to what fewer views saw: what else was seen there is
   /// nearer than that prediction, and is the object.
   void grow() {
-    std::size_t const fewest = images_.size() < 6 ? 1 : 2;
+    // Chance agreement grows with the number of views.
+    std::size_t const fewest = images_.size() < 6 ? 1 : std::max<std::size_t>(2, images_.size() / 5);
     // A chain of predictions could climb onto the object where it stands on the ground: what is bridged from the seeds
     // alone bounds how near the background may come.
     cv::Mat1d straight = linear_.clone();
@@ -273,7 +291,7 @@ class ModelBuilder {
           if (bridged - z > bridge_error(bridged, distance(q)) + kClusterSigmas * noise_factor_ * cluster[0].sigma)
             continue;
           accept(q.x, q.y, cluster);
-          if (model_.color_sigma(q) > 3 * kColorFloor)
+          if (model_.color_sigma(q) > kSameColor * color_noise_)
             forget(q.x, q.y);
           else
             next.push_back(q);
@@ -291,45 +309,65 @@ class ModelBuilder {
   double bridge_error(double z, double pixels) const { return kBridgeSlope * camera_.pixel_size(z) * pixels; }
 
   /// The background's colour reaches farther than its depth, which is missing beside an object: a view's colour counts
-  /// where it continues the colours known around the pixel.
+  /// where it is that of the nearest known pixels. These stay the standard, lest small steps lead onto the object.
   void grow_color() {
-    std::vector<cv::Point> front;
+    find_still_colors();
+    struct Place {
+      cv::Point at;
+      cv::Vec3f standard;
+    };
+    std::vector<Place> front;
     for (int y = 0; y < size_.height; ++y)
       for (int x = 0; x < size_.width; ++x)
-        if (known_(y, x) != 0) front.emplace_back(x, y);
+        if (std::isfinite(model_.color_sigma(y, x))) front.push_back({{x, y}, model_.color(y, x)});
     cv::Mat1b tried(size_, static_cast<std::uint8_t>(0));
     cv::Rect const inside({0, 0}, size_);
     while (!front.empty()) {
-      std::vector<cv::Point> next;
-      for (cv::Point const p : front)
+      std::vector<Place> next;
+      for (auto const& [p, standard] : front)
         for (cv::Point const q :
              {p + cv::Point(1, 0), p + cv::Point(-1, 0), p + cv::Point(0, 1), p + cv::Point(0, -1)}) {
           if (!inside.contains(q) || std::isfinite(model_.color_sigma(q)) || tried(q) >= kMostTries) continue;
           ++tried(q);
-          if (continue_color(q)) next.push_back(q);
+          if (continue_color(q, standard)) next.push_back({q, standard});
         }
       front = std::move(next);
     }
   }
 
-  bool continue_color(cv::Point q) {
-    cv::Vec3f around(0, 0, 0);
-    int count = 0;
-    for (int v = std::max(0, q.y - 2); v <= std::min(size_.height - 1, q.y + 2); ++v)
-      for (int u = std::max(0, q.x - 2); u <= std::min(size_.width - 1, q.x + 2); ++u)
-        if (std::isfinite(model_.color_sigma(v, u))) around += model_.color(v, u), ++count;
-    if (count < 5) return false;
-    around *= 1.0f / static_cast<float>(count);
+  /// A colour that three quarters of the views agree on needs no depth to be the background's.
+  void find_still_colors() {
+    std::vector<float> values(images_.size());
+    for (int y = 0; y < size_.height; ++y)
+      for (int x = 0; x < size_.width; ++x) {
+        if (std::isfinite(model_.color_sigma(y, x))) continue;
+        cv::Vec3f middle;
+        for (int c = 0; c < 3; ++c) {
+          for (std::size_t i = 0; i < images_.size(); ++i) values[i] = matched(i, x, y)[c];
+          middle[c] = median(values);
+        }
+        std::size_t agreeing = 0;
+        for (std::size_t i = 0; i < images_.size(); ++i)
+          agreeing += cv::norm(matched(i, x, y) - middle) < kSameColor * color_noise_;
+        if (agreeing * 4 < images_.size() * 3) continue;
+        model_.color(y, x) = middle;
+        model_.color_sigma(y, x) = 2 * color_noise_;
+      }
+  }
+
+  bool continue_color(cv::Point q, cv::Vec3f const& standard) {
     cv::Vec3f sum(0, 0, 0);
     int agreeing = 0;
     for (std::size_t i = 0; i < images_.size(); ++i) {
-      cv::Vec3f color;
-      for (int c = 0; c < 3; ++c) color[c] = images_[i]->color(q)[c] * gains_[i][c];
-      if (cv::norm(color - around) < 2 * kColorFloor) sum += color, ++agreeing;
+      // What has a depth must have the background's; what has none may be it.
+      double const in_front = model_.depth(q) - images_[i]->depth(q);  // NaN where there is no depth
+      if (std::abs(in_front) > kClusterSigmas * model_.sigma(q)) continue;
+      cv::Vec3f const color = matched(i, q.x, q.y);
+      if (cv::norm(color - standard) < kSameColor * color_noise_) sum += color, ++agreeing;
     }
     if (agreeing < 2) return false;
     model_.color(q) = sum * (1.0f / static_cast<float>(agreeing));
-    model_.color_sigma(q) = static_cast<float>(1.5 * kColorFloor);
+    model_.color_sigma(q) = 2 * color_noise_;
     return true;
   }
 
@@ -351,6 +389,7 @@ class ModelBuilder {
   cv::Size size_;
   double noise_factor_;
   std::vector<cv::Vec3f> gains_;
+  float color_noise_ = kColorFloor;
   cv::Mat1d linear_;  ///< what is linear over a plane
   cv::Mat1b known_;
   BackgroundModel model_;
