@@ -244,15 +244,14 @@ void export_point_cloud(fs::path const& path, ScanSet const& set, Context& conte
 void export_colmap(fs::path const& folder, ScanSet const& set, Context& context) {
   require_exportable(folder, set);
   require_perspective(folder, set, "COLMAP");
-  require_replaceable(folder, "points3D.txt");
+  require_replaceable(folder, "sparse/points3D.txt");
   NewFolder out(folder);
-  make_folder(out.path() / "images");
-  make_folder(out.path() / "stereo" / "depth_maps");
+  for (char const* part : {"sparse", "images", "stereo/depth_maps"}) make_folder(out.path() / part);
   Cameras const cameras = distinct_cameras(set);
   ColmapModel const model = colmap_model(set, cameras);
-  write_file(out.path() / "cameras.txt", colmap_cameras(cameras));
-  write_file(out.path() / "images.txt", model.images);
-  write_file(out.path() / "points3D.txt", model.points);
+  write_file(out.path() / "sparse" / "cameras.txt", colmap_cameras(cameras));
+  write_file(out.path() / "sparse" / "images.txt", model.images);
+  write_file(out.path() / "sparse" / "points3D.txt", model.points);
   auto const write_view = [&](std::size_t v) {
     View const& view = set.views[v];
     write_file(out.path() / "images" / (view.name + ".png"), encode_png(gained_color(view)));

@@ -16,8 +16,8 @@ namespace scanview {
 /// About 72 bytes of memory a point.
 void export_point_cloud(std::filesystem::path const& path, ScanSet const& set, Context& context);
 
-/// A COLMAP text model: cameras.txt, images.txt and points3D.txt (some 50 000 of the depths, each observed by its own
-/// view), images/NAME.png and stereo/depth_maps/NAME.png.geometric.bin, with COLMAP's pixel centres at halves. The
+/// A COLMAP workspace: sparse/cameras.txt, images.txt and points3D.txt (some 50 000 of the depths, each observed by its
+/// own view), images/NAME.png and stereo/depth_maps/NAME.png.geometric.bin, with COLMAP's pixel centres at halves. The
 /// world is the object's coordinate system, in the set's unit. COLMAP has perspective cameras only: an orthographic
 /// view is an Error{bad_input} that names it.
 void export_colmap(std::filesystem::path const& folder, ScanSet const& set, Context& context);

@@ -137,8 +137,8 @@ TEST(ExportColmap, CamerasAndPosesProjectThePointsWhereTheyWereSeen) {
   ScanSet const set = make_set();
   fs::path const out = folder.path() / "model";
   export_colmap(out, set, context);
-  auto const cameras = read_table(out / "cameras.txt"), images = read_table(out / "images.txt"),
-             points = read_table(out / "points3D.txt");
+  auto const cameras = read_table(out / "sparse" / "cameras.txt"), images = read_table(out / "sparse" / "images.txt"),
+             points = read_table(out / "sparse" / "points3D.txt");
   ASSERT_EQ(cameras.size(), 2u);
   ASSERT_EQ(images.size(), 4u);                     // two lines an image
   ASSERT_EQ(points.size(), points_of(set).size());  // few enough to be all there
@@ -200,7 +200,7 @@ TEST(ExportColmap, EqualCamerasAreWrittenOnce) {
   ScanSet set = make_set();
   set.views[1] = make_view("left", set.views[0].image.camera, *set.views[1].object_from_camera);
   export_colmap(folder.path() / "model", set, context);
-  EXPECT_EQ(read_table(folder.path() / "model" / "cameras.txt").size(), 1u);
+  EXPECT_EQ(read_table(folder.path() / "model" / "sparse" / "cameras.txt").size(), 1u);
 }
 
 TEST(ExportNerfstudio, DepthIsWithinHalfAStepAndTheStepIsAsFineAsItCanBe) {
@@ -301,7 +301,7 @@ TEST(Export, ASetWithoutAnyDepthIsStillWritten) {
   export_point_cloud(folder.path() / "cloud.ply", set, context);
   EXPECT_EQ(read_ply(folder.path() / "cloud.ply").find("vertex")->rows, 0u);
   export_colmap(folder.path() / "colmap", set, context);
-  EXPECT_TRUE(read_table(folder.path() / "colmap" / "points3D.txt").empty());
+  EXPECT_TRUE(read_table(folder.path() / "colmap" / "sparse" / "points3D.txt").empty());
   export_nerfstudio(folder.path() / "nerf", set, context);
   EXPECT_TRUE(fs::exists(folder.path() / "nerf" / "transforms.json"));
 }
