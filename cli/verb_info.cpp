@@ -1,0 +1,188 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "acquire/archive.h"
+#include "acquire/import.h"
+#include "acquire/rgbd_manifest.h"
+#include "acquire/scan_set_file.h"
+#include "acquire/stanford_conf.h"
+#include "base/error.h"
+#include "base/image_file.h"
+#include "base/ply.h"
+#include "cli/session.h"
+#include "mesh/triangle_mesh.h"
+
+namespace scanview {
+namespace fs = std::filesystem;
+namespace {
+
+Json info_scan_set(fs::path const& folder, Context& context) {
+  ScanSet const set = read_scan_set(folder, context);
+  Json info = {{"kind", "scan set"}, {"unit", to_string(set.unit)}, {"views", Json::array()}};
+  for (auto const& view : set.views)
+    info["views"].push_back({{"name", view.name},
+                             {"width", view.image.camera.width()},
+                             {"height", view.image.camera.height()},
+                             {"model", view.image.camera.is_perspective() ? "perspective" : "orthographic"},
+                             {"depths", view.image.count_depths()},
+                             {"pose", view.object_from_camera.has_value()},
+                             {"mesh", fs::exists(folder / view_folder(view.name) / "mesh.ply")}});
+  info["center"] = {set.center.x(), set.center.y(), set.center.z()};
+  info["radius"] = set.radius();
+  info["threshold"] = set.error_budget.threshold();
+  Json stages = Json::array();
+  for (char const* stage : {"synth", "import", "acquire", "register", "mesh", "render", "evaluate"})
+    if (fs::exists(folder / (std::string(stage) + ".json"))) stages.push_back(stage);
+  info["stages"] = stages;
+  return info;
+}
+
+Json info_ply(fs::path const& path) {
+  PlyFile const ply = read_ply(path);
+  Json info = {{"kind", "PLY"}, {"elements", Json::array()}};
+  for (auto const& element : ply.elements) {
+    Json properties = Json::array();
+    for (auto const& property : element.properties)
+      properties.push_back(property.is_list ? property.name + "[]" : property.name);
+    info["elements"].push_back({{"name", element.name}, {"rows", element.rows}, {"properties", properties}});
+  }
+  if (!ply.obj_info.empty()) info["obj_info"] = ply.obj_info;
+  return info;
+}
+
+Json info_exr(fs::path const& path) {
+  cv::Mat1f const depth = read_depth_exr(path);
+  float low = std::numeric_limits<float>::infinity(), high = -low;
+  std::size_t count = 0;
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x)
+      if (std::isfinite(depth(y, x))) low = std::min(low, depth(y, x)), high = std::max(high, depth(y, x)), ++count;
+  return {{"kind", "range image"}, {"width", depth.cols},         {"height", depth.rows},
+          {"depths", count},       {"nearest", json_number(low)}, {"farthest", json_number(high)}};
+}
+
+/// The header of a binary glTF (specification 2.0, section 4.4) and what its JSON says there is.
+Json info_glb(fs::path const& path) {
+  std::string const bytes = read_file(path);
+  auto const word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+  };
+  if (bytes.size() < 20 || bytes.compare(0, 4, "glTF") != 0 || word(8) != bytes.size() || word(12) > bytes.size() - 20)
+    throw Error(ErrorCode::bad_input, path, "is truncated or no binary glTF");
+  Json const gltf = Json::parse(bytes.substr(20, word(12)), nullptr, false);
+  if (!gltf.is_object()) throw Error(ErrorCode::bad_input, path, "has no valid glTF JSON");
+  auto const count = [&](char const* key) { return gltf.value(key, Json::array()).size(); };
+  return {{"kind", "binary glTF"},     {"bytes", bytes.size()},     {"nodes", count("nodes")},
+          {"meshes", count("meshes")}, {"images", count("images")}, {"accessors", count("accessors")}};
+}
+
+Json info_rgbd(fs::path const& path) {
+  RgbdSource const source = read_rgbd_manifest(path);
+  bool poses = !source.frames.empty();
+  for (auto const& frame : source.frames) poses = poses && (frame.pose || frame.pose_file);
+  return {{"kind", "colour and depth frames"},       {"frames", source.frames.size()},
+          {"unit", to_string(source.unit)},          {"depth_unit", source.depth_unit},
+          {"camera", source.color.camera.to_json()}, {"poses", poses},
+          {"fixed_camera", source.fixed_camera}};
+}
+
+Json info_json(fs::path const& path) {
+  if (path.filename() == "rgbd.json") return info_rgbd(path);
+  Json const json = read_json(path);
+  Json info = {{"kind", "JSON"}};
+  if (json.is_object() && json.contains("stage") && json.contains("figures"))
+    info = {{"kind", "record of a stage"},
+            {"stage", json["stage"]},
+            {"version", json.value("version", Json())},
+            {"figures", json["figures"]}};
+  else if (json.is_object() && json.contains("frames"))
+    info = {{"kind", "nerfstudio transforms"}, {"frames", json["frames"].size()}};
+  else if (json.is_object() && json.contains("keyframes"))
+    info = {{"kind", "camera path"}, {"keyframes", json["keyframes"].size()}};
+  else if (json.is_object())
+    for (auto const& [key, value] : json.items()) info["keys"].push_back(key);
+  return info;
+}
+
+Json info_mesh(fs::path const& path) {
+  TriangleMesh const mesh = read_triangle_mesh(path);
+  return {{"kind", "triangle mesh"},
+          {"vertices", mesh.vertices.size()},
+          {"triangles", mesh.triangles.size()},
+          {"colors", !mesh.colors.empty()}};
+}
+
+Json info_archive(fs::path const& path) {
+  Json names = Json::array();
+  read_archive(path, [&](std::string const& name) { return names.push_back(name), false; });
+  return {{"kind", "archive"}, {"import", guess_import_kind(path)}, {"files", names}};
+}
+
+Json info(fs::path const& path, Context& context) {
+  if (!fs::exists(path)) throw Error(ErrorCode::bad_input, path, "does not exist");
+  if (fs::is_directory(path)) {
+    if (fs::exists(path / "scanset.json")) return info_scan_set(path, context);
+    if (fs::exists(path / "rgbd.json")) return info_rgbd(path / "rgbd.json");
+    std::string const kind = guess_import_kind(path);
+    if (kind.empty())
+      throw Error(ErrorCode::bad_input, path, "is no folder that can be read (no scan set, no known layout)");
+    return {{"kind", "folder"}, {"import", kind}};
+  }
+  std::string const name = path.filename().string();
+  auto const ends = [&](std::string_view ending) { return name.ends_with(ending); };
+  if (name == "scanset.json") return info_scan_set(path.parent_path(), context);
+  if (ends(".ply")) return info_ply(path);
+  if (ends(".obj") || ends(".obj.gz") || ends(".ply.gz")) return info_mesh(path);
+  if (ends(".exr")) return info_exr(path);
+  if (ends(".glb")) return info_glb(path);
+  if (ends(".json")) return info_json(path);
+  if (ends(".conf")) return {{"kind", "Stanford poses"}, {"scans", read_stanford_conf(path).size()}};
+  if (is_archive(path)) return info_archive(path);
+  if (ends(".png") || ends(".jpg") || ends(".jpeg")) {
+    cv::Mat const image = read_image(path);
+    return {{"kind", "picture"},
+            {"width", image.cols},
+            {"height", image.rows},
+            {"channels", image.channels()},
+            {"bits", image.depth() == CV_8U ? 8 : 16}};
+  }
+  throw Error(ErrorCode::bad_input, path, "is of no kind that scanview reads or writes");
+}
+
+void print(Json const& json, std::string const& indent) {
+  for (auto const& [key, value] : json.items()) {
+    bool const is_table = value.is_array() && !value.empty() && value[0].is_object();
+    if (value.is_object()) {
+      std::cout << indent << key << ":\n";
+      print(value, indent + "  ");
+    } else if (is_table) {
+      std::cout << indent << key << ":\n";
+      for (auto const& row : value) std::cout << indent << "  " << row.dump() << '\n';
+    } else {
+      std::cout << fmt::format("{}{}: {}\n", indent, key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Session& session) {
+  auto path = std::make_shared<fs::path>();
+  CLI::App* verb = app.add_subcommand("info", "What is in a file or folder");
+  verb->add_option("path", *path, "Scan set, frames, mesh, picture, range image, record, archive ...")->required();
+  verb->callback([path, &session] {
+    session.verb = "info";
+    session.work = [path, &session] {
+      Json const result = info(*path, session.context);
+      session.report.update(result);
+      print(result, "");
+    };
+  });
+}
+
+}  // namespace scanview

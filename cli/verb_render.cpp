@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+#include "acquire/scan_set_file.h"
+#include "base/error.h"
+#include "base/image_file.h"
+#include "cli/stages.h"
+#include "viewer/select/camera_path.h"
+#include "viewer/view_based/view_based_renderer.h"
+
+namespace scanview {
+namespace fs = std::filesystem;
+namespace {
+
+struct Arguments {
+  fs::path set, output, path;
+  int orbit = 0;
+  bool halfway = false;
+  std::string like, size = "800x600", back_end = "gl";
+  ViewBasedOptions options;
+};
+
+std::pair<int, int> parse_size(std::string const& text) {
+  int width = 0, height = 0;
+  char end = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &end) != 2 || width < 1 || height < 1 || width > 16384 ||
+      height > 16384)
+    throw Error(ErrorCode::usage, {}, fmt::format("--size {}: expected WIDTHxHEIGHT, 1 to 16384 each", text));
+  return {width, height};
+}
+
+std::vector<PathCamera> cameras(Arguments const& arguments, ScanSet const& set) {
+  auto const [width, height] = parse_size(arguments.size);
+  if (arguments.orbit > 0) return orbit_path(set, arguments.orbit, width, height);
+  if (arguments.halfway) return halfway_path(set, width, height);
+  if (!arguments.path.empty()) return read_camera_path(arguments.path, set, width, height);
+  return {camera_like(set, arguments.like, width, height)};
+}
+
+void render(Arguments const& arguments, Session& session) {
+  Context& context = session.context;
+  ScanSet const set = read_scan_set(arguments.set, context);
+  auto const path = cameras(arguments, set);
+  auto const gl = make_offscreen_context();
+  auto const renderer =
+      make_view_based_renderer(*gl, set, read_view_meshes(arguments.set, set, context), arguments.options);
+  std::error_code error;
+  fs::create_directories(arguments.output, error);
+  if (error) throw Error(ErrorCode::io, arguments.output, "cannot create: " + error.message());
+
+  session.report["frames"] = Json::array();
+  session.report["back_end"] = arguments.back_end;
+  std::vector<double> times;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    context.check_cancelled();
+    auto const start = std::chrono::steady_clock::now();
+    Frame const frame = renderer->render(path[i].camera, path[i].object_from_camera);
+    times.push_back(1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    std::string const file = path[i].name + ".png";
+    write_file(arguments.output / file, encode_png(frame.color));
+    write_depth_exr(arguments.output / (path[i].name + ".exr"), frame.depth);
+    session.report["frames"].push_back({{"file", file}, {"milliseconds", times.back()}});
+    context.progress("render", i + 1, path.size());
+  }
+  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
+  session.report["fps_median"] = times.empty() ? 0 : 1e3 / times[times.size() / 2];
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Session& session) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb =
+      app.add_subcommand("render", "Pictures (PNG with alpha) and depths (EXR) from any side; needs no display");
+  verb->add_option("set", arguments->set, "The scan set, meshed")->required();
+  verb->add_option("-o,--output", arguments->output, "Folder of the pictures")->required();
+  CLI::Option_group* which = verb->add_option_group("cameras");
+  which->add_option("--orbit", arguments->orbit, "A full turn in so many pictures")->check(CLI::Range(1, 100000));
+  which->add_flag("--halfway", arguments->halfway, "From halfway between consecutive views");
+  which->add_option("--path", arguments->path, "Cameras of a path file");
+  which->add_option("--like", arguments->like, "From the camera of this view");
+  which->require_option(1);
+  verb->add_option("--size", arguments->size, "WIDTHxHEIGHT");
+  verb->add_option("--back-end", arguments->back_end, "gl (OpenGL 3.3 without a display)")
+      ->check(CLI::IsMember({"gl"}));
+  verb->add_option("--threshold", arguments->options.threshold, "Of soft z, in units (default: from the error budget)");
+  verb->add_option("--fill-views", arguments->options.fill_views,
+                   "Views beyond the three that fill holes (0: the paper's three)");
+  verb->callback([arguments, &session] {
+    session.verb = "render";
+    session.work = [arguments, &session] { render(*arguments, session); };
+  });
+}
+
+}  // namespace scanview

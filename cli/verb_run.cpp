@@ -1,0 +1,135 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <iostream>
+#include <memory>
+
+#include "base/error.h"
+#include "cli/import_flags.h"
+#include "cli/stage_flags.h"
+
+namespace scanview {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::array kVerbs = {"import", "register", "mesh", "render", "evaluate"};
+
+struct Arguments {
+  fs::path input, output;
+  std::string kind, from, to, hold_out = "one";
+  bool force = false, dry_run = false;
+  ImportFlags import_flags;
+  RegisterFlags register_flags;
+  MeshFlags mesh_flags;
+};
+
+std::size_t verb_index(std::string const& name, std::size_t otherwise) {
+  if (name.empty()) return otherwise;
+  auto const it = std::find(kVerbs.begin(), kVerbs.end(), name);
+  if (it == kVerbs.end()) throw Error(ErrorCode::usage, {}, fmt::format("'{}' is no stage of run", name));
+  return static_cast<std::size_t>(it - kVerbs.begin());
+}
+
+bool is_scan_set(fs::path const& path) { return fs::exists(path / "scanset.json"); }
+
+class Pipeline {
+ public:
+  Pipeline(Arguments const& arguments, Session& session)
+      : arguments_(arguments),
+        session_(session),
+        register_request_(resolve(arguments.register_flags, session.settings)),
+        mesh_options_(resolve(arguments.mesh_flags, session.settings)) {
+    if (!fs::exists(arguments.input)) throw Error(ErrorCode::bad_input, arguments.input, "does not exist");
+    folder_ = arguments.output;
+    if (folder_.empty()) {
+      if (!is_scan_set(arguments.input)) throw Error(ErrorCode::usage, {}, "say with -o where the scan set goes");
+      folder_ = arguments.input;
+    }
+    std::error_code error;
+    in_place_ =
+        is_scan_set(arguments.input) && (arguments.output.empty() || fs::equivalent(arguments.input, folder_, error));
+    if (in_place_) return;
+    import_.input = arguments.input;
+    import_.options = resolve(arguments.import_flags);
+    import_.kind = !arguments.kind.empty()        ? arguments.kind
+                   : is_scan_set(arguments.input) ? "scanset"
+                                                  : guess_import_kind(arguments.input);
+    if (import_.kind.empty())
+      throw Error(
+          ErrorCode::bad_input, arguments.input,
+          "is none of the layouts that are known; describe colour and depth frames in an rgbd.json, or say --kind");
+  }
+
+  StageOutcome stage(std::string const& verb, StageMode mode) {
+    Context& context = session_.context;
+    if (verb == "import") {
+      if (in_place_) return {.figures = Json::object(), .was_up_to_date = true};
+      return import_stage(folder_, import_, mode, context);
+    }
+    if (verb == "register") return register_stage(folder_, register_request_, mode, context);
+    if (verb == "mesh") return mesh_stage(folder_, mesh_options_, mode, context);
+    if (verb == "render") return render_stage(folder_, mode, context);
+    return evaluate_stage(folder_, {arguments_.hold_out}, mode, context);
+  }
+
+  void run() {
+    std::size_t const first = verb_index(arguments_.from, 0), last = verb_index(arguments_.to, kVerbs.size() - 1);
+    if (first > last) throw Error(ErrorCode::usage, {}, "--from comes after --to");
+    session_.report["stages"] = Json::object();
+    bool stale = false;  // once a stage would work, all after it would
+    for (std::size_t i = first; i <= last; ++i) {
+      std::string const verb = kVerbs[i];
+      if (arguments_.dry_run) {
+        stale = stale || arguments_.force || (!in_place_ && !is_scan_set(folder_)) ||
+                !stage(verb, StageMode::check).was_up_to_date;
+        std::cout << fmt::format("{:<10} {}\n", verb, stale ? "would run" : "is up to date");
+        continue;
+      }
+      session_.context.check_cancelled();
+      StageOutcome const outcome = stage(verb, arguments_.force ? StageMode::force : StageMode::resume);
+      session_.context.log(fmt::format("{:<10} {}", verb, outcome.was_up_to_date ? "is up to date" : "done"));
+      session_.report["stages"][verb] = outcome.figures;
+      if (session_.exit_code == 0) session_.exit_code = outcome.exit_code;
+    }
+    if (!arguments_.dry_run && !session_.quiet) std::cout << (folder_ / "report.html").string() << '\n';
+  }
+
+ private:
+  Arguments const& arguments_;
+  Session& session_;
+  fs::path folder_;
+  bool in_place_ = false;
+  ImportRequest import_;
+  RegisterRequest register_request_;
+  MeshOptions mesh_options_;
+};
+
+}  // namespace
+
+void add_run(CLI::App& app, Session& session) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb = app.add_subcommand("run", "Every stage in order, from frames to pictures and a report");
+  verb->add_option("input", arguments->input, "Colour and depth frames, scans, or a scan set")->required();
+  verb->add_option("-o,--output", arguments->output, "The scan set to make (a set alone is worked on in place)");
+  verb->add_option("--kind", arguments->kind,
+                   "Kind of the input, where it cannot be told: rgbd, stanford, nerfstudio, colmap");
+  verb->add_option("--from", arguments->from, "First stage: import, register, mesh, render, evaluate");
+  verb->add_option("--to", arguments->to, "Last stage");
+  verb->add_flag("--force", arguments->force, "Also where nothing changed");
+  verb->add_flag("--dry-run", arguments->dry_run, "Only say what would run");
+  verb->add_option("--hold-out", arguments->hold_out,
+                   "Views to judge pictures by: one (each in turn), every:N, NAME,...");
+  add_import_flags(*verb, arguments->import_flags);
+  add_register_flags(*verb, arguments->register_flags);
+  add_mesh_flags(*verb, arguments->mesh_flags);
+  verb->callback([arguments, &session] {
+    session.verb = "run";
+    session.work = [arguments, &session] {
+      check_settings(session.settings, {"register", "mesh"});
+      Pipeline(*arguments, session).run();
+    };
+  });
+}
+
+}  // namespace scanview

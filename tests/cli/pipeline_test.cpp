@@ -1,0 +1,104 @@
+// From a synthetic scan to pictures: what the stages must reach together, and the sets that are hard.
+#include <gtest/gtest.h>
+
+#include "acquire/scan_set_file.h"
+#include "base/files.h"
+#include "base/image_file.h"
+#include "tests/cli/command.h"
+#include "tests/temporary_folder.h"
+
+namespace scanview {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Pipeline : public ::testing::Test {
+ protected:
+  /// Runs a verb that must succeed and returns its report.
+  Json run(std::vector<std::string> arguments) {
+    fs::path const report = folder_.path() / "report.json";
+    arguments.insert(arguments.end(), {"--quiet", "--report", report.string()});
+    CommandResult const result = run_scanview(arguments);
+    EXPECT_EQ(result.exit_code, 0) << arguments[0] << ": " << result.errors;
+    return result.exit_code == 0 ? read_json(report) : Json::object();
+  }
+  std::string in(std::string const& name) const { return (folder_.path() / name).string(); }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Pipeline, ASyntheticScanComesBack) {
+  run({"synth", "statuette", "-o", in("scan"), "--views", "16", "--size", "480x360", "--noise", "0.001",
+       "--color-noise", "1", "--disturb", "3:2"});
+  Json const all = run({"run", in("scan"), "-o", in("set")});
+  for (char const* verb : {"import", "register", "mesh", "render", "evaluate"})
+    EXPECT_TRUE(all["stages"].contains(verb)) << verb;
+
+  Json const registered = run({"register", in("set"), "--reference", in("scan/truth/scanset.json")});
+  Context context;
+  double const size = 2 * read_scan_set(in("set"), context).radius();
+  EXPECT_LE(registered["reference"]["median_deg"].get<double>(), 0.05);
+  EXPECT_LE(registered["reference"]["median_length"].get<double>(), 1e-3 * size);
+
+  Json const evaluated = all["stages"]["evaluate"]["renderers"];
+  EXPECT_GE(evaluated["view_based"]["psnr_common"].get<double>(), 28);
+  EXPECT_GE(evaluated["source_views"]["psnr_common_min"].get<double>(), 35);
+
+  std::string const report = read_file(in("set/report.html"));
+  for (char const* part :
+       {"id=\"import\"", "id=\"register\"", "id=\"mesh\"", "id=\"render\"", "id=\"evaluate\"", "data:image/"})
+    EXPECT_NE(report.find(part), std::string::npos) << part;
+  EXPECT_EQ(report.find("src=\"http"), std::string::npos);
+}
+
+TEST_F(Pipeline, PicturesHaveAlphaAndDepth) {
+  run({"synth", "statuette", "-o", in("set"), "--views", "6", "--size", "160x120"});
+  run({"mesh", in("set")});
+  Json const report = run({"render", in("set"), "--orbit", "3", "--size", "90x70", "-o", in("orbit")});
+  ASSERT_EQ(report["frames"].size(), 3U);
+  cv::Mat const picture = read_image(in("orbit/" + report["frames"][1]["file"].get<std::string>()));
+  EXPECT_EQ(picture.size(), cv::Size(90, 70));
+  EXPECT_EQ(picture.channels(), 4);
+  cv::Mat4b const pixels = picture;
+  EXPECT_EQ(pixels(0, 0)[3], 0);
+  EXPECT_EQ(pixels(35, 45)[3], 255);
+  cv::Mat1f const depth = read_depth_exr(in("orbit/001.exr"));
+  EXPECT_TRUE(std::isnan(depth(0, 0)));
+  EXPECT_GT(depth(35, 45), 0);
+  run({"render", in("set"), "--like", "002", "-o", in("like")});
+  run({"render", in("set"), "--halfway", "-o", in("halfway")});
+}
+
+TEST_F(Pipeline, FewViewsAndCirclesGiveDefinedPictures) {
+  struct Case {
+    char const* views;
+    char const* layout;
+  };
+  for (Case const& one : {Case{"1", "sphere"}, Case{"2", "sphere"}, Case{"3", "circle"}, Case{"8", "circle"}}) {
+    std::string const set = in(std::string(one.layout) + one.views);
+    run({"synth", "statuette", "-o", set, "--views", one.views, "--layout", one.layout, "--size", "120x90"});
+    Json const report = run({"run", set});
+    EXPECT_TRUE(report["stages"].contains("evaluate")) << one.views << " on a " << one.layout;
+    run({"render", set, "--orbit", "4", "--size", "80x60", "-o", set + "_orbit"});
+  }
+}
+
+TEST_F(Pipeline, ExportsComeBack) {
+  run({"synth", "statuette", "-o", in("set"), "--views", "3", "--size", "160x120"});
+  run({"mesh", in("set")});
+  for (char const* kind : {"colmap", "nerfstudio"}) {
+    run({"export", in("set"), "--to", kind, "-o", in(kind)});
+    Json const report = run({"import", kind, in(kind), "-o", in(std::string(kind) + "_set")});
+    EXPECT_EQ(report["views"], 3);
+  }
+  run({"export", in("set"), "--to", "ply", "-o", in("points.ply")});
+  run({"export", in("set"), "--to", "glb", "-o", in("views.glb")});
+  EXPECT_EQ(run({"info", in("views.glb")})["kind"], "binary glTF");
+  EXPECT_EQ(run({"info", in("points.ply")})["kind"], "PLY");
+  for (char const* name :
+       {"set", "set/scanset.json", "set/mesh.json", "set/views/000/range.exr", "set/views/000/color.png",
+        "set/views/000/mesh.ply", "set/views/000/mesh.glb", "nerfstudio/transforms.json", "colmap"})
+    EXPECT_TRUE(run({"info", in(name)}).contains("kind")) << name;
+}
+
+}  // namespace
+}  // namespace scanview

@@ -1,0 +1,49 @@
+// The real sets that lie beside the project on the builders' machines; skipped by name elsewhere.
+#include <gtest/gtest.h>
+
+#include "base/files.h"
+#include "tests/cli/command.h"
+#include "tests/temporary_folder.h"
+
+namespace scanview {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RealData : public ::testing::Test {
+ protected:
+  static fs::path data(std::string const& name) {
+    return fs::path(SCANVIEW_SOURCE_DIR).parent_path() / "shared/data" / name;
+  }
+  Json run(std::vector<std::string> arguments) {
+    fs::path const report = folder_.path() / "report.json";
+    arguments.insert(arguments.end(), {"--quiet", "--report", report.string()});
+    CommandResult const result = run_scanview(arguments);
+    EXPECT_EQ(result.exit_code, 0) << arguments[0] << ": " << result.errors;
+    return result.exit_code == 0 ? read_json(report) : Json::object();
+  }
+  std::string in(std::string const& name) const { return (folder_.path() / name).string(); }
+  TemporaryFolder folder_;
+};
+
+/// Median over the pairs of their median distance between overlapping surfaces.
+double median_distance(Json const& registered) {
+  std::vector<double> distances;
+  for (auto const& pair : registered["pairs"]) distances.push_back(pair["median_distance"].get<double>());
+  std::sort(distances.begin(), distances.end());
+  return distances.empty() ? 1e9 : distances[distances.size() / 2];
+}
+
+TEST_F(RealData, BearAlignsToTheDotsAndComesBackFromItsCameras) {
+  if (!fs::exists(data("bear_rgbd"))) GTEST_SKIP() << "bear_rgbd is not here";
+  Json const all = run({"run", data("bear_rgbd").string(), "-o", in("bear")});
+  Json const registered = run({"register", in("bear"), "--reference", (data("bear_rgbd") / "rgbd.json").string()});
+  EXPECT_LE(median_distance(registered), 0.7e-3);
+  // The poses from the turntable's dots are independent of the object and known to about this much.
+  EXPECT_LE(registered["reference"]["pose_max_deg"].get<double>(), 1.5);
+  EXPECT_LE(registered["reference"]["pose_max_length"].get<double>(), 2e-3);
+  EXPECT_GE(all["stages"]["evaluate"]["renderers"]["source_views"]["psnr_common_min"].get<double>(), 35);
+}
+
+}  // namespace
+}  // namespace scanview
