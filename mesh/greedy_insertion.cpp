@@ -215,7 +215,8 @@ class GreedyTriangulation {
       }
       if (max_triangles_ > 0 && triangles_ + 2 > max_triangles_) return false;
       queue_.pop();
-      if (!split_border(worst.face, worst.pixel)) insert_pixel(worst.face, worst.pixel);
+      Eigen::Vector2d const point(worst.pixel % tolerance_.cols, worst.pixel / tolerance_.cols);
+      if (!split_border(worst.face, point)) insert_pixel(worst.face, worst.pixel);
     }
     return true;
   }
@@ -227,34 +228,61 @@ class GreedyTriangulation {
     double along;  ///< 0 at the segment's first end, 1 at its last
   };
 
-  /// Where a border edge of the face passes beside the pixel, and not next to an end of that edge.
-  std::optional<Split> find_split(FaceHandle face, Eigen::Vector2i const& pixel) const {
-    std::optional<Split> best;
-    double best_distance = INFINITY;
+  /// How obtuse the angle is under which a point sees an edge: beyond it a triangle on that edge says nothing about the
+  /// surface's normal.
+  static bool sees_flatly(Eigen::Vector2d const& point, Eigen::Vector2d const& u, Eigen::Vector2d const& v) {
+    constexpr double kCos = -0.7071;  // 135 degrees
+    return (u - point).dot(v - point) < kCos * (u - point).norm() * (v - point).norm();
+  }
+
+  /// A border edge of the face that is too long beside a point so near to it, and the gate at which to split it: the
+  /// nearest to the point that is not next to an end of the edge.
+  std::optional<Split> find_split(FaceHandle face, Eigen::Vector2d const& point) const {
     for (int i = 0; i < 3; ++i) {
       if (!face->is_constrained(i)) continue;
       VertexHandle const u = face->vertex(Cdt::ccw(i)), v = face->vertex(Cdt::cw(i));
+      if (!sees_flatly(point, position(u), position(v))) continue;
       int const index = segment_of(u->info().border, v->info().border);
       OutlineSegment const& segment = outline_.segments[index];
-      Eigen::Vector2d const from = outline_.vertices[segment.from].position;
-      Eigen::Vector2d const whole = outline_.vertices[segment.to].position - from;
-      for (std::size_t g = 0; g < segment.gates.size(); ++g) {
-        Gate const& gate = segment.gates[g];
-        if (gate.left != pixel && gate.right != pixel) continue;
-        int const axis = gate.left.x() == gate.right.x() ? 0 : 1;  // the gate's line has this coordinate fixed
-        if (whole[axis] == 0) continue;
-        double const along = (gate.left[axis] - from[axis]) / whole[axis];
-        Eigen::Vector2d const place = from + along * whole;
-        double const distance = (place - pixel.cast<double>()).norm();
+      auto const along_at = [&](Eigen::Vector2d const& place) { return along_segment(segment, place); };
+      // Gates come in the order in which the segment passes them.
+      auto const after = std::partition_point(segment.gates.begin(), segment.gates.end(), [&](Gate const& gate) {
+        return along_gate(segment, gate) < along_at(point);
+      });
+      std::optional<Split> best;
+      double best_distance = INFINITY;
+      for (auto gate = after == segment.gates.begin() ? after : after - 1; gate != segment.gates.end() && gate <= after;
+           ++gate) {
+        double const along = along_gate(segment, *gate);
+        Eigen::Vector2d const place = on_segment(segment, along);
         constexpr double kApart = 0.5;
         bool const apart = (place - position(u)).norm() >= kApart && (place - position(v)).norm() >= kApart;
         bool const between = (place - position(u)).dot(place - position(v)) < 0;
+        double const distance = (place - point).norm();
         if (!apart || !between || distance >= best_distance) continue;
         best_distance = distance;
-        best = Split{i, index, g, along};
+        best = Split{i, index, std::size_t(gate - segment.gates.begin()), along};
       }
+      if (best) return best;
     }
-    return best;
+    return std::nullopt;
+  }
+
+  Eigen::Vector2d on_segment(OutlineSegment const& segment, double along) const {
+    Eigen::Vector2d const from = outline_.vertices[segment.from].position;
+    return from + along * (outline_.vertices[segment.to].position - from);
+  }
+  double along_segment(OutlineSegment const& segment, Eigen::Vector2d const& place) const {
+    Eigen::Vector2d const from = outline_.vertices[segment.from].position;
+    Eigen::Vector2d const whole = outline_.vertices[segment.to].position - from;
+    return (place - from).dot(whole) / whole.squaredNorm();
+  }
+  /// Where the segment crosses the line through the gate's two pixels.
+  double along_gate(OutlineSegment const& segment, Gate const& gate) const {
+    Eigen::Vector2d const from = outline_.vertices[segment.from].position;
+    Eigen::Vector2d const whole = outline_.vertices[segment.to].position - from;
+    int const axis = gate.left.x() == gate.right.x() ? 0 : 1;  // the coordinate that is fixed on that line
+    return whole[axis] == 0 ? 0 : (gate.left[axis] - from[axis]) / whole[axis];
   }
 
   int segment_of(int border_u, int border_v) const {
@@ -263,15 +291,16 @@ class GreedyTriangulation {
     return segment_of_ends_.at(std::minmax(border_u, border_v));
   }
 
-  bool split_border(FaceHandle face, int pixel) {
-    auto const split = find_split(face, {pixel % tolerance_.cols, pixel / tolerance_.cols});
+  /// Puts a vertex on the border where an edge of the face is too long beside the point. False where none is.
+  bool split_border(FaceHandle face, Eigen::Vector2d const& point) {
+    auto const split = find_split(face, point);
     if (!split) return false;
-    // A multiple of 2^-20 of a segment whose ends are multiples of ½ is exact in a double: the border stays straight.
+    // A multiple of 2^-20 of a segment whose ends are multiples of 1/8 is exact in a double: the border stays straight.
     OutlineSegment const& segment = outline_.segments[split->segment];
     Eigen::Vector2d const from = outline_.vertices[segment.from].position;
     Eigen::Vector2d const to = outline_.vertices[segment.to].position;
     constexpr double kParts = 1 << 20;
-    Eigen::Vector2d const place = from + (to - from) * (std::round(split->along * kParts) / kParts);
+    Eigen::Vector2d const place = on_segment(segment, std::round(split->along * kParts) / kParts);
 
     VertexHandle const u = face->vertex(Cdt::ccw(split->edge)), v = face->vertex(Cdt::cw(split->edge));
     Kernel::Point_2 const point_u = u->point(), point_v = v->point();
@@ -300,6 +329,7 @@ class GreedyTriangulation {
     int const x = pixel % tolerance_.cols, y = pixel / tolerance_.cols;
     is_vertex_(y, x) = 1;
     Kernel::Point_2 const point(x, y);
+    if (cdt_.is_infinite(face)) face = face->neighbor(face->index(cdt_.infinite_vertex()));
     int edge = -1;
     bool moved = true;
     while (moved) {
@@ -320,6 +350,19 @@ class GreedyTriangulation {
     added->info().depth = local_surface(x, y).depth;
     triangles_ += 2;
     look_around(added, [](FaceHandle) { return true; });
+    while (split_border_around(added)) {
+    }
+  }
+
+  /// Splits one border edge that is too long beside a vertex so near to it. False where none is.
+  bool split_border_around(VertexHandle vertex) {
+    if (max_triangles_ > 0 && triangles_ + 2 > max_triangles_) return false;
+    auto around = cdt_.incident_faces(vertex), start = around;
+    do {
+      FaceHandle const face = around;
+      if (!cdt_.is_infinite(face) && face->info().inside && split_border(face, position(vertex))) return true;
+    } while (++around != start);
+    return false;
   }
 
   /// All faces that an insertion changes have the new vertex.
@@ -328,10 +371,11 @@ class GreedyTriangulation {
     std::vector<FaceHandle> faces;
     auto around = cdt_.incident_faces(vertex), start = around;
     do {
-      if (!cdt_.is_infinite(around)) faces.push_back(around);
+      faces.push_back(around);
     } while (++around != start);
     for (FaceHandle const face : faces) {
-      face->info().inside = is_inside(face);
+      // Also of a face outside the hull, which may have been one inside before an edge of the hull was split.
+      face->info().inside = !cdt_.is_infinite(face) && is_inside(face);
       face->info().stamp = 0;
       if (face->info().inside) look_at(face);
     }

@@ -15,11 +15,11 @@ namespace scanview {
 /// again, and so on until every pixel of `links.object` is within its tolerance, or the next vertex would make more
 /// than `max_triangles` (0: no limit; the outline alone may need more).
 ///
-/// Where the worst pixel lies beside the outline, the outline gets a vertex instead, near that pixel, so that the
-/// border's depths are followed as well. A vertex in the picture takes the depth of a plane through the linked pixels
-/// around where the pixels agree with a plane to their sigma, but moves by no more than half the tolerance; else the
-/// pixel's own depth. A vertex on the outline is extended by the slope of its side, at most as far as the neighbouring
-/// depths differ, one vertex for each side of a step.
+/// Where the worst pixel lies near the outline beside a long edge of it, the outline gets a vertex there first, so that
+/// the border's depths are followed and no sliver lies along it whose normal means nothing (an angle of more than 135
+/// degrees at the pixel). The depth of a vertex in the picture is that of fit_local_surface(). A vertex on the outline
+/// is extended by the slope of its side, at most as far as the neighbouring depths differ, one vertex for each side of
+/// a step.
 ///
 /// Depths are checked on the vertices as they are returned, in single precision: afterwards the error at every pixel
 /// that is not itself a vertex is within tolerance, unless the limit was reached. Coordinates are the camera's;

@@ -82,7 +82,8 @@ LocalSurface fit_local_surface(RangeImage const& image, SurfaceLinks const& link
   double const fitted = own + plane[0];
   if (!(sum <= kAgrees * kAgrees * count) || (image.camera.is_perspective() && fitted <= 0)) return surface;
   double const z = image.depth(y, x), move = linear_depth(image.camera, fitted) - z;
-  double const kept = z + std::clamp(move, -tolerance / 2, tolerance / 2);
+  double const limit = tolerance >= 2 * image.sigma(y, x) ? 0.95 * tolerance : 0.5 * tolerance;
+  double const kept = z + std::clamp(move, -limit, limit);
   if (!image.camera.is_perspective() || (kept > z / 2 && kept < 2 * z))
     surface.depth = linear_depth(image.camera, kept);
   return surface;

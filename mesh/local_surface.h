@@ -13,7 +13,9 @@ struct LocalSurface {
 };
 
 /// Fits a plane to the pixels within two of (x, y) that can be reached over links. The depth is the plane's where the
-/// pixels agree with a plane to their sigma, moved by at most half of `tolerance` (in depth); else the pixel's own.
+/// pixels agree with a plane to their sigma, so that no vertex follows noise; else the pixel's own. It moves by no more
+/// than 0.95 of `tolerance` (in depth), which keeps the pixel itself in tolerance, and by half of it where the
+/// tolerance is less than two sigma: there the plane's own error counts.
 LocalSurface fit_local_surface(RangeImage const& image, SurfaceLinks const& links, int x, int y, double tolerance);
 
 /// Linear depth at a place less than a pixel away from (x, y): along the slope, by no more than `reach`.

@@ -112,53 +112,75 @@ std::vector<Chain> find_chains(CrackGraph graph) {
   return chains;
 }
 
-/// How near to a pixel's centre, in parts of the distance to its neighbour, a segment may pass.
-constexpr double kMargin = 0.1;
+/// How near to a pixel's centre, in parts of the distance to its neighbour, a segment may pass: far enough for single
+/// precision to keep the centre on its side, near enough to keep straight borders in one piece.
+constexpr double kMargin = 0.01;
 
-/// Positions along a chain where a segment may end: corners (even) and middles of sides (odd).
+/// Where a segment may end: at the corner before gate `gate`, or on that gate, so many eighths from left to right.
+struct ChainPlace {
+  int gate = 0;
+  int eighths = 0;  ///< 0: the corner
+
+  bool operator==(ChainPlace const&) const = default;
+};
+
 class ChainSimplifier {
  public:
   /// `free_loop`: a closed chain without a node on it, which may begin anywhere.
   ChainSimplifier(Chain const& chain, bool free_loop)
       : chain_(chain), count_(int(chain.gates.size())), free_loop_(free_loop) {}
 
-  /// Positions of the polyline's vertices, the first and the last included; in a closed chain the last is the first
-  /// plus twice the number of gates.
-  std::vector<int> run() const {
-    std::vector<int> const best = from(0);
+  /// The polyline's vertices, the first and the last included; gates go on counting after a closed chain's end.
+  std::vector<ChainPlace> run() const {
+    std::vector<ChainPlace> const best = from({0, 0});
     if (!free_loop_) return best;
-    std::vector<int> const other = from(best[1]);
+    std::vector<ChainPlace> const other = from(best[1]);
     return other.size() < best.size() ? other : best;
   }
 
-  Eigen::Vector2d position(int at) const {
-    if (at % 2 == 1) return (gate(at / 2).left + gate(at / 2).right).cast<double>() / 2;
-    int const corner = at / 2 <= count_ ? at / 2 : at / 2 - count_;
+  Eigen::Vector2d position(ChainPlace const& place) const {
+    if (place.eighths > 0) {
+      Gate const& on = gate(place.gate);
+      return on.left.cast<double>() + place.eighths / 8.0 * (on.right - on.left).cast<double>();
+    }
+    int const corner = place.gate <= count_ ? place.gate : place.gate - count_;
     return chain_.corners[corner].cast<double>() - Eigen::Vector2d(0.5, 0.5);
   }
   Gate const& gate(int index) const { return chain_.gates[index % count_]; }
 
+  /// The gates that a segment passes, those its ends lie on included: the first, and the one after the last.
+  static std::pair<int, int> passed(ChainPlace const& from, ChainPlace const& to) {
+    return {from.gate, to.eighths > 0 ? to.gate + 1 : to.gate};
+  }
+
  private:
-  std::vector<int> from(int start) const {
-    std::vector<int> result = {start};
-    int const end = start + 2 * count_;
-    while (result.back() < end) result.push_back(farthest(result.back(), end));
+  std::vector<ChainPlace> from(ChainPlace start) const {
+    std::vector<ChainPlace> result = {start};
+    ChainPlace const end{start.gate + count_, start.eighths};
+    while (result.back() != end) result.push_back(farthest(result.back(), end));
     return result;
   }
 
-  /// The last position up to `end` that a straight line reaches through all gates between.
-  int farthest(int start, int end) const {
+  /// The last place up to `end` that a straight line reaches through all gates between.
+  ChainPlace farthest(ChainPlace const& start, ChainPlace const& end) const {
     Eigen::Vector2d const origin = position(start);
     Eigen::Vector2d left, right;  // of the cone of lines that pass all gates so far
     bool open = true;
-    int reached = start + 1;
-    auto in_cone = [&](Eigen::Vector2d const& v) { return open || (cross(right, v) >= 0 && cross(v, left) >= 0); };
-    for (int index = (start + 1) / 2;; ++index) {
-      int const corner = 2 * index, middle = corner + 1;
-      if (corner > start && corner <= end && in_cone(position(corner) - origin)) reached = corner;
-      if (corner >= end) return reached;
-      if (middle > start && middle <= end && in_cone(position(middle) - origin)) reached = middle;
-      if (middle >= end) return reached;
+    ChainPlace reached = start;
+    auto const try_place = [&](ChainPlace const& place) {
+      Eigen::Vector2d const v = position(place) - origin;
+      bool const in_cone = open || (cross(right, v) >= 0 && cross(v, left) >= 0);
+      if (in_cone) reached = place;
+      return in_cone;
+    };
+    for (int index = start.eighths > 0 ? start.gate + 1 : start.gate;; ++index) {
+      if (index > start.gate) try_place({index, 0});
+      if (index == end.gate) {
+        if (end.eighths > 0) try_place(end);
+        return reached;
+      }
+      for (int const eighths : {4, 3, 5, 2, 6, 1, 7})
+        if (try_place({index, eighths})) break;
       Eigen::Vector2d const l = gate(index).left.cast<double>(), r = gate(index).right.cast<double>();
       Eigen::Vector2d const to_left = l + kMargin * (r - l) - origin, to_right = r + kMargin * (l - r) - origin;
       if (open) {
@@ -184,15 +206,15 @@ class ChainSimplifier {
 Outline trace_outline(SurfaceLinks const& links) {
   Outline outline;
   CrackGraph const graph(links);
-  std::map<std::pair<int, int>, int> vertex_of_place;  // doubled coordinates
+  std::map<std::pair<int, int>, int> vertex_of_place;  // in eighths of a pixel
   auto vertex = [&](Eigen::Vector2d const& position) {
-    int const x2 = int(2 * position.x()), y2 = int(2 * position.y());
-    auto [it, is_new] = vertex_of_place.try_emplace({y2, x2}, int(outline.vertices.size()));
+    int const x8 = int(8 * position.x()), y8 = int(8 * position.y());
+    auto [it, is_new] = vertex_of_place.try_emplace({y8, x8}, int(outline.vertices.size()));
     if (is_new) {
       OutlineVertex added{position, {}};
-      // floor and ceil of x2/2 are the columns beside it: the same one where the coordinate is whole.
-      for (int y : {y2 >> 1, (y2 + 1) >> 1})
-        for (int x : {x2 >> 1, (x2 + 1) >> 1}) {
+      // The columns and rows beside it: the same one where a coordinate is whole.
+      for (int y : {y8 >> 3, (y8 + 7) >> 3})
+        for (int x : {x8 >> 3, (x8 + 7) >> 3}) {
           Eigen::Vector2i const pixel(x, y);
           bool const inside = x >= 0 && y >= 0 && x < links.object.cols && y < links.object.rows;
           if (inside && std::find(added.pixels.begin(), added.pixels.end(), pixel) == added.pixels.end())
@@ -204,13 +226,13 @@ Outline trace_outline(SurfaceLinks const& links) {
   };
   for (Chain const& chain : find_chains(graph)) {
     ChainSimplifier const simplifier(chain, chain.closed() && graph.degree(chain.corners.front()) == 2);
-    std::vector<int> const positions = simplifier.run();
-    for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
+    std::vector<ChainPlace> const places = simplifier.run();
+    for (std::size_t k = 0; k + 1 < places.size(); ++k) {
       OutlineSegment segment;
-      segment.from = vertex(simplifier.position(positions[k]));
-      segment.to = vertex(simplifier.position(positions[k + 1]));
-      for (int index = positions[k] / 2; index <= (positions[k + 1] - 1) / 2; ++index)
-        segment.gates.push_back(simplifier.gate(index));
+      segment.from = vertex(simplifier.position(places[k]));
+      segment.to = vertex(simplifier.position(places[k + 1]));
+      auto const [first, end] = ChainSimplifier::passed(places[k], places[k + 1]);
+      for (int index = first; index < end; ++index) segment.gates.push_back(simplifier.gate(index));
       outline.segments.push_back(std::move(segment));
     }
   }

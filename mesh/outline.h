@@ -13,15 +13,14 @@ struct Gate {
   Eigen::Vector2i left, right;
 };
 
-/// A straight piece of an outline. It passes between the two pixels of each of its gates, in order, at least a
-/// twentieth of a pixel away from their centres.
+/// A straight piece of an outline. It passes between the two pixels of each of its gates, in order, at least 1/150 of a
+/// pixel away from their centres.
 struct OutlineSegment {
   int from = 0, to = 0;     ///< vertices
   std::vector<Gate> gates;  ///< those it passes, in order; the ones its ends lie on included
 };
 
-/// An end of segments, at a corner of pixels or in the middle of a side between two: in both cases each coordinate is a
-/// multiple of ½.
+/// An end of segments, at a corner of pixels or on a side between two: each coordinate is a multiple of 1/8.
 struct OutlineVertex {
   Eigen::Vector2d position;
   std::vector<Eigen::Vector2i> pixels;  ///< the two or four around it that are inside the picture

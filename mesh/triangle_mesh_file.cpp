@@ -25,6 +25,7 @@ struct ArchiveCloser {
 };
 
 std::string unpack_gzip(fs::path const& path, std::string const& packed) {
+  if (!packed.starts_with("\x1f\x8b")) throw Error(ErrorCode::bad_input, path, "not a gzip file");
   std::unique_ptr<struct archive, ArchiveCloser> const reader(archive_read_new());
   archive_read_support_filter_gzip(reader.get());
   archive_read_support_format_raw(reader.get());
