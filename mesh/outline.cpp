@@ -1,8 +1,10 @@
 #include "mesh/outline.h"
 
 #include <algorithm>
+#include <climits>
+#include <cmath>
 #include <map>
-#include <optional>
+#include <utility>
 
 namespace scanview {
 namespace {
@@ -154,24 +156,39 @@ class ChainSimplifier {
   }
 
  private:
-  std::vector<ChainPlace> from(ChainPlace start) const {
+  std::vector<ChainPlace> from(ChainPlace const& start) const {
     std::vector<ChainPlace> result = {start};
     ChainPlace const end{start.gate + count_, start.eighths};
-    while (result.back() != end) result.push_back(farthest(result.back(), end));
+    while (result.back() != end) {
+      // Of the places that are as far as can be, the one from which the next piece gets farthest.
+      ChainPlace best;
+      int best_reach = -1;
+      for (ChainPlace const& place : farthest(result.back(), end)) {
+        int const reach = place == end ? INT_MAX : order(farthest(place, end).front());
+        if (reach > best_reach) best = place;
+        best_reach = std::max(best_reach, reach);
+      }
+      result.push_back(best);
+    }
+    settle(result);
     return result;
   }
 
-  /// The last place up to `end` that a straight line reaches through all gates between.
-  ChainPlace farthest(ChainPlace const& start, ChainPlace const& end) const {
+  /// Grows along the chain.
+  static int order(ChainPlace const& place) { return 2 * place.gate + (place.eighths > 0); }
+
+  /// The places on the last gate, or the last corner, up to `end` that a straight line reaches through all gates
+  /// between.
+  std::vector<ChainPlace> farthest(ChainPlace const& start, ChainPlace const& end) const {
     Eigen::Vector2d const origin = position(start);
     Eigen::Vector2d left, right;  // of the cone of lines that pass all gates so far
     bool open = true;
-    ChainPlace reached = start;
+    std::vector<ChainPlace> reached;
     auto const try_place = [&](ChainPlace const& place) {
       Eigen::Vector2d const v = position(place) - origin;
-      bool const in_cone = open || (cross(right, v) >= 0 && cross(v, left) >= 0);
-      if (in_cone) reached = place;
-      return in_cone;
+      if (!open && !(cross(right, v) >= 0 && cross(v, left) >= 0)) return;
+      if (!reached.empty() && order(reached.front()) != order(place)) reached.clear();
+      reached.push_back(place);
     };
     for (int index = start.eighths > 0 ? start.gate + 1 : start.gate;; ++index) {
       if (index > start.gate) try_place({index, 0});
@@ -179,8 +196,7 @@ class ChainSimplifier {
         if (end.eighths > 0) try_place(end);
         return reached;
       }
-      for (int const eighths : {4, 3, 5, 2, 6, 1, 7})
-        if (try_place({index, eighths})) break;
+      for (int const eighths : {4, 3, 5, 2, 6, 1, 7}) try_place({index, eighths});
       Eigen::Vector2d const l = gate(index).left.cast<double>(), r = gate(index).right.cast<double>();
       Eigen::Vector2d const to_left = l + kMargin * (r - l) - origin, to_right = r + kMargin * (l - r) - origin;
       if (open) {
@@ -194,6 +210,42 @@ class ChainSimplifier {
       }
       if (cross(right, left) <= 0) return reached;
     }
+  }
+
+  /// How far a straight line is from the middles of the gates it passes, squared and summed; infinite where it fails
+  /// one.
+  double deviation(ChainPlace const& from, ChainPlace const& to) const {
+    Eigen::Vector2d const origin = position(from), along = position(to) - origin;
+    double sum = 0;
+    auto const [first, end] = passed(from, to);
+    for (int index = first; index < end; ++index) {
+      Eigen::Vector2d const left = gate(index).left.cast<double>();
+      double const turn = cross(along, gate(index).right.cast<double>() - left);
+      if (!(turn < 0)) return INFINITY;
+      double const at = -cross(along, left - origin) / turn;
+      if (!(at >= kMargin && at <= 1 - kMargin)) return INFINITY;
+      sum += (at - 0.5) * (at - 0.5);
+    }
+    return sum;
+  }
+
+  /// The fewest vertices are not yet the best: each slides to where its two pieces follow the border best.
+  void settle(std::vector<ChainPlace>& places) const {
+    constexpr int kSweeps = 2, kReach = 2;
+    for (int sweep = 0; sweep < kSweeps; ++sweep)
+      for (std::size_t k = 1; k + 1 < places.size(); ++k) {
+        ChainPlace const before = places[k - 1], after = places[k + 1], old = places[k];
+        double least = deviation(before, old) + deviation(old, after);
+        for (int gate = old.gate - kReach; gate <= old.gate + kReach; ++gate)
+          for (int eighths = 0; eighths < 8; ++eighths) {
+            ChainPlace const place{gate, eighths};
+            if (order(place) <= order(before) || order(place) >= order(after)) continue;
+            double const sum = deviation(before, place) + deviation(place, after);
+            if (sum >= least) continue;
+            least = sum;
+            places[k] = place;
+          }
+      }
   }
 
   Chain const& chain_;

@@ -23,32 +23,44 @@ class StepTest {
                                                  : 1.0 / std::max(camera.fx(), camera.fy());
     if (jump <= noise + width) return false;
 
-    // Predicted jump, from either side; where a side is too short to have a slope the other alone decides.
-    double const from_a = predicted_jump(x, y, -dx, -dy, za), from_b = -predicted_jump(x + dx, y + dy, dx, dy, zb);
     double const sign = zb > za ? 1 : -1;
-    double slope = 0;
-    if (std::isnan(from_a))
-      slope = std::isnan(from_b) ? 0 : sign * from_b;
-    else
-      slope = std::isnan(from_b) ? sign * from_a : std::min(sign * from_a, sign * from_b);
-    return jump > noise + std::max(width, 2 * slope);
+    Side const a = side(x, y, -dx, -dy, za, sign), b = side(x + dx, y + dy, dx, dy, zb, -sign);
+    // Where a side is too short to have a slope the other alone decides.
+    double const both = std::isnan(a.jump) ? b.jump : std::isnan(b.jump) ? a.jump : std::min(a.jump, b.jump);
+    double slope = std::max(a.sustained, b.sustained);
+    if (both > 0) slope = std::max(slope, 2 * both);
+    return jump > noise + std::max(width, slope);
   }
 
  private:
-  /// The surface that starts at (x, y) and goes on in direction (dx, dy): how much deeper than z it would be one pixel
-  /// before (x, y). NaN where there is but one pixel.
-  double predicted_jump(int x, int y, int dx, int dy, double z) const {
-    double const q0 = linear_depth(image_.camera, z);
-    if (!has_depth(x + dx, y + dy)) return std::numeric_limits<double>::quiet_NaN();
-    double const q1 = linear_depth(image_.camera, image_.depth(y + dy, x + dx));
-    double slope = q0 - q1;
-    if (has_depth(x + 2 * dx, y + 2 * dy))
-      slope = (q0 - linear_depth(image_.camera, image_.depth(y + 2 * dy, x + 2 * dx))) / 2;
-    double const q = q0 + slope;
-    if (image_.camera.is_perspective() && q <= 0) return std::numeric_limits<double>::infinity();
-    return linear_depth(image_.camera, q) - z;
+  /// What the surface on one side of a jump says about it, in units, positive in the direction of the jump.
+  struct Side {
+    double jump = std::numeric_limits<double>::quiet_NaN();  ///< predicted; NaN where there is but one pixel
+    double sustained = 0;  ///< what two successive differences of three pixels both reach
+  };
+
+  /// The surface that starts at (x, y), at depth z, and goes on in direction (dx, dy), continued by one pixel the other
+  /// way.
+  Side side(int x, int y, int dx, int dy, double z, double sign) const {
+    Side result;
+    if (!has_depth(x + dx, y + dy)) return result;
+    double const q0 = linear(x, y), q1 = linear(x + dx, y + dy);
+    if (!has_depth(x + 2 * dx, y + 2 * dy)) {
+      result.jump = sign * continued(q0, q0 - q1, z);
+      return result;
+    }
+    double const q2 = linear(x + 2 * dx, y + 2 * dy);
+    result.jump = sign * continued(q0, (q0 - q2) / 2, z);
+    double const near = sign * continued(q0, q0 - q1, z), far = sign * continued(q0, q1 - q2, z);
+    result.sustained = std::max(0.0, std::min(near, far));
+    return result;
   }
 
+  double continued(double q, double slope, double z) const {
+    if (image_.camera.is_perspective() && q + slope <= 0) return std::numeric_limits<double>::infinity();
+    return linear_depth(image_.camera, q + slope) - z;
+  }
+  double linear(int x, int y) const { return linear_depth(image_.camera, image_.depth(y, x)); }
   bool has_depth(int x, int y) const {
     return x >= 0 && y >= 0 && x < image_.depth.cols && y < image_.depth.rows && image_.has_depth(x, y);
   }

@@ -28,12 +28,12 @@ struct SurfaceLinks {
 };
 
 /// Two neighbours a, b with depths are on one surface where
-///   |z_b − z_a| ≤ step_sigmas · √(σ_a² + σ_b²) + max(width of a pixel, 2 · the slope).
-/// The slope is the depth difference that the surface to the left of a predicts for b, and the one that the surface to
-/// the right of b predicts for a, whichever is less: a line through up to three pixels, linear in 1/z under
-/// perspective, so that a plane at any angle has no step, while pixels that fly between two surfaces have one on either
-/// side. It counts only where it has the sign of the difference. A jump smaller than a pixel is wide can't be told from
-/// a slope of 45°. A step of one pixel's length inside one surface is none. Patches (pixels that are linked, directly
+///   |z_b − z_a| ≤ step_sigmas · √(σ_a² + σ_b²) + max(width of a pixel, slope).
+/// The slope is what the surfaces on either side, continued by a pixel, make of the difference, linear in 1/z under
+/// perspective, so that a plane at any angle has no step: twice the lesser of the two sides' (lines through up to three
+/// pixels), or, of one side alone, what two successive differences both reach, which keeps steep crests and tips whole.
+/// Pixels that fly between two surfaces have neither. A jump smaller than a pixel is wide can't be told from a slope
+/// of 45°. A step of one pixel's length inside one surface is none. Patches (pixels that are linked, directly
 /// or not) of fewer than `min_patch_pixels` are dropped. Linear in the number of pixels.
 SurfaceLinks find_surface_links(RangeImage const& image, double step_sigmas, int min_patch_pixels);
 
