@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -100,8 +101,7 @@ cv::Mat3d read_grid(PlyFile const& ply, fs::path const& path) {
   return points;
 }
 
-/// Median distance, across the view, of neighbours in the grid: {between columns, between rows}. Measured in x and y
-/// only, as the camera sees them; neighbours in rows may be told apart in either.
+/// Median distance of neighbours in the grid as the camera sees them: {in x between columns, in y between rows}.
 std::array<double, 2> grid_spacing(cv::Mat3d const& points, fs::path const& path) {
   std::array<double, 2> spacing{};
   for (int direction = 0; direction < 2; ++direction) {
@@ -109,7 +109,7 @@ std::array<double, 2> grid_spacing(cv::Mat3d const& points, fs::path const& path
     for (int row = 0; row + direction < points.rows; ++row)
       for (int col = 0; col + 1 - direction < points.cols; ++col) {
         cv::Vec3d const d = points(row + direction, col + 1 - direction) - points(row, col);
-        double const step = std::hypot(d[0], d[1]);
+        double const step = std::abs(d[direction]);
         if (std::isfinite(step)) steps.push_back(step);
       }
     if (steps.size() < 10) fail(path, "fewer than 10 neighbours in the range grid");
@@ -118,6 +118,21 @@ std::array<double, 2> grid_spacing(cv::Mat3d const& points, fs::path const& path
     if (!(spacing[static_cast<std::size_t>(direction)] > 0)) fail(path, "the range grid's points coincide");
   }
   return spacing;
+}
+
+/// The PLY without header lines that are none of the format's: some of the Stanford scans hold stray words there.
+std::string clean_header(std::string const& bytes) {
+  constexpr std::array known{"ply", "format", "comment", "obj_info", "element", "property", "end_header"};
+  std::string clean;
+  for (std::size_t at = 0; at < bytes.size();) {
+    std::size_t const end = std::min(bytes.find('\n', at), bytes.size() - 1) + 1;
+    std::string const line = bytes.substr(at, end - at);
+    std::string const word = line.substr(0, line.find_first_of(" \r\n"));
+    if (std::find(known.begin(), known.end(), word) != known.end()) clean += line;
+    at = end;
+    if (word == "end_header") return clean + bytes.substr(at);
+  }
+  return bytes;  // no header at all: for the reader to say
 }
 
 /// How far in front of a scan's points its orthographic camera stands, in diagonals of their box. Depths are then
@@ -141,8 +156,9 @@ RawView load_scan(PlyFile const& ply, fs::path const& path) {
                rows = std::ceil((high[1] - low[1]) / spacing[1]) + 3;
   if (columns > 32768 || rows > 32768 || columns * rows > 64.0 * 1024 * 1024)
     fail(path, "the scan's extent is too large for the spacing of its points");
+  // A pixel centre falls on the lowest corner, and so on every point of a grid that is regular.
   raw.camera = Camera::orthographic(static_cast<int>(columns), static_cast<int>(rows), spacing[0], spacing[1],
-                                    (columns - 1) / 2, (rows - 1) / 2);
+                                    1 + (middle[0] - low[0]) / spacing[0], 1 + (high[1] - middle[1]) / spacing[1]);
   raw.object_from_camera = Eigen::Translation3d(middle[0], middle[1], high[2] + stand_off) *
                            Eigen::AngleAxisd(std::acos(-1.0), Eigen::Vector3d::UnitX());
   raw.object_from_camera->linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();  // exactly
@@ -238,7 +254,7 @@ ImportResult import_stanford(fs::path const& path, ImportOptions const& options,
   for (std::size_t i = 0; i < lines.size(); ++i)
     plan.views.push_back({names[i], [&files, &line = lines[i], &spacing = spacings[i]] {
                             fs::path const file = files.path_of(line.file);
-                            RawView raw = load_scan(parse_ply(files.read(line.file), file), file);
+                            RawView raw = load_scan(parse_ply(clean_header(files.read(line.file)), file), file);
                             raw.object_from_camera = world_from_scan(line, files.conf) * *raw.object_from_camera;
                             spacing = 1 / raw.camera.fx();
                             return raw;

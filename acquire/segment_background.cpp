@@ -18,6 +18,7 @@ constexpr double kInFront = 3;           // sigmas by which the object stands ou
 constexpr double kMostEvidence = 8;      // of one pixel, as a log likelihood ratio: no pixel is certain
 constexpr double kUnsureNearStep = 0.1;  // what a depth is worth next to a step, where matching windows straddle it
 constexpr double kShading = 0.04;        // by which the object's shadow may change the background's brightness
+constexpr double kNoDepth = 1;           // what has none is sooner a shadow of the sensor's beside the object
 constexpr int kStepReach = 8;            // pixels
 constexpr double kSmoothness = 6;        // price of a mask border across a pair of equal colours
 
@@ -132,6 +133,7 @@ cv::Mat1d evidence(BackgroundModel const& model, cv::Mat1f const& ratio, cv::Mat
         bool const unsure = near_object(y, x) != 0 && near_background(y, x) != 0;
         result(y, x) += depth_evidence(r) * (unsure ? kUnsureNearStep : 1.0);
       }
+      if (measured(y, x) == 0) result(y, x) -= kNoDepth;
       if (std::isfinite(model.color_sigma(y, x))) {
         double const squared = color_distance(color(y, x), model.color(y, x), model.color_sigma(y, x));
         result(y, x) += std::clamp((squared - 20) / 4, -5.0, 6.0);

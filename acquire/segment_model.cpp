@@ -264,11 +264,6 @@ class ModelBuilder {
   void grow() {
     // Chance agreement grows with the number of views.
     std::size_t const fewest = images_.size() < 6 ? 1 : std::max<std::size_t>(2, images_.size() / 5);
-    // A chain of predictions could climb onto the object where it stands on the ground: what is bridged from the seeds
-    // alone bounds how near the background may come.
-    cv::Mat1d straight = linear_.clone();
-    bridge(straight, known_);
-    cv::Mat1f const distance = distance_to_known();
     std::vector<cv::Point> front;
     for (int y = 0; y < size_.height; ++y)
       for (int x = 0; x < size_.width; ++x)
@@ -287,9 +282,8 @@ class ModelBuilder {
           if (seen.size() < fewest || !predict(linear_, known_, q.x, q.y, predicted)) continue;
           auto const cluster = cluster_at(seen, to_linear(camera_, predicted), noise_factor_);  // its own inverse
           if (cluster.size() < fewest) continue;
-          double const bridged = to_linear(camera_, straight(q)), z = cluster[cluster.size() / 2].depth;
-          if (bridged - z > bridge_error(bridged, distance(q)) + kClusterSigmas * noise_factor_ * cluster[0].sigma)
-            continue;
+          if (cluster.data() - seen.data() >= static_cast<std::ptrdiff_t>(fewest))
+            continue;  // something lies behind it
           accept(q.x, q.y, cluster);
           if (model_.color_sigma(q) > kSameColor * color_noise_)
             forget(q.x, q.y);
