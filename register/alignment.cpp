@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -18,12 +19,13 @@ namespace {
 
 constexpr double kMinScale = 1e-3;  // of residuals, in sigmas: views may agree perfectly
 constexpr double kMinToneScale = 5e-3;
+constexpr double kSettledGain = 0.05;  // of the cost, in variances: a fifth of one standard deviation
 
 // What one linearisation measured over all pairs; the next one weighs by it.
 struct Scales {
-  double geometry = 0, tone = 0;  // 0: not measured yet
-  double geometry_share = 1, tone_share = 1;
-  double distance = 0;  // robust standard deviation, units
+  double geometry = 0, tone = 0;                          // 0: not measured yet
+  double geometry_correlation = 0, tone_correlation = 0;  // of neighbouring residuals
+  double distance = 0;                                    // robust standard deviation, units
 };
 
 class Aligner {
@@ -90,6 +92,8 @@ class Aligner {
             throw Error(ErrorCode::bad_input, {}, "view " + view.name + " has no pose to start from");
           poses.push_back(*view.object_from_camera);
         }
+        problem_.believed = poses;
+        problem_.belief_std = options_.given_std * radius_;
         break;
       case RegisterOptions::Init::none:
         poses.assign(set_.views.size(), Eigen::Isometry3d::Identity());
@@ -150,8 +154,8 @@ class Aligner {
     match.max_samples = level > 0 ? 3000 : 6000;
     if (scales_.geometry > 0) match.geometry_scale = scales_.geometry;
     if (scales_.tone > 0) match.tone_scale = scales_.tone;
-    match.geometry_share = scales_.geometry_share;
-    match.tone_share = scales_.tone_share;
+    match.geometry_share = effective_share(scales_.geometry_correlation);
+    match.tone_share = effective_share(scales_.tone_correlation);
     std::vector<PairForm> forms(graph_.edges.size());
     for_each_index(context_, forms.size(), [&](std::size_t e) {
       ViewGraphEdge const& edge = graph_.edges[e];
@@ -173,9 +177,9 @@ class Aligner {
       distances.insert(distances.end(), form.distances.begin(), form.distances.end());
     }
     scales_.geometry = std::max(kMinScale, robust_scale(geometry.values));
-    scales_.geometry_share = effective_share(geometry.correlation());
+    scales_.geometry_correlation = geometry.correlation();
     scales_.tone = tone.values.empty() ? 0 : std::max(kMinToneScale, robust_scale(tone.values));
-    scales_.tone_share = effective_share(tone.correlation());
+    scales_.tone_correlation = tone.correlation();
     scales_.distance = robust_scale(distances);
     return forms;
   }
@@ -218,9 +222,15 @@ class Aligner {
         JointStep const step = solve_joint(problem_, joint_spectrum(problem_), PairLoss::quadratic);
         problem_.object_from_camera = step.object_from_camera;
         ++result_.iterations;
+        context_.log(
+            fmt::format("refine: level {}, {} pairs, largest step {:.3g}, gain {:.3g}, distances {:.3g} (neighbours "
+                        "correlate {:.2f}), tones {:.3g} "
+                        "({:.2f}), gate {:.3g}",
+                        level, graph_.edges.size(), step.largest, step.gain, scales_.distance,
+                        scales_.geometry_correlation, scales_.tone, scales_.tone_correlation, gate));
         context_.progress("register: refine", static_cast<std::size_t>(result_.iterations),
                           static_cast<std::size_t>(options_.max_iterations));
-        bool const settled = step.largest < (level > 0 ? 0.1 : 0.02) * pixel;
+        bool const settled = step.largest < (level > 0 ? 0.1 : 0.02) * pixel || step.gain < kSettledGain;
         if (settled && level == 0) result_.status = AlignmentStatus::converged;
         if (settled) break;
       }
@@ -245,8 +255,8 @@ class Aligner {
     for (std::size_t i = 0; i < views_.size(); ++i) {
       auto const at = static_cast<Eigen::Index>(6 * i);
       PoseFigures pose;
-      pose.std_deg = std::sqrt(std::max(0.0, spectrum.covariance.block<3, 3>(at, at).trace())) / radius_ * 180 /
-                     3.14159265358979323846;
+      pose.std_deg =
+          std::sqrt(std::max(0.0, spectrum.covariance.block<3, 3>(at, at).trace())) / radius_ * 180 / std::numbers::pi;
       pose.std_length = std::sqrt(std::max(0.0, spectrum.covariance.block<3, 3>(at + 3, at + 3).trace()));
       result_.poses.push_back(pose);
     }
@@ -315,6 +325,7 @@ void RegisterOptions::validate() const {
   if (!turntable_axis.allFinite()) refuse("turntable axis must be finite");
   if (levels < 1 || levels > 12) refuse("levels must be 1 to 12");
   if (max_iterations < 1) refuse("max_iterations must be at least 1");
+  if (!(given_std >= 0)) refuse("given_std must not be negative");
   if (!(min_overlap > 0 && min_overlap <= 1)) refuse("min_overlap must lie above 0 and at most at 1");
 }
 

@@ -18,6 +18,10 @@ struct RegisterOptions {
   int levels = 4;            ///< of the pyramid, coarse to fine
   int max_iterations = 30;   ///< joint refinements with fresh correspondences
   double min_overlap = 0.1;  ///< share of a view's depths that another view sees: pairs below are not used
+  /// `given`: one standard deviation of the given poses, as a share of a view's radius (a rotation moves a point at
+  /// this radius). Where the data says more, this changes nothing; where surfaces nearly slide it keeps a pose near
+  /// where it was measured to be. 0: the given poses are a start, and nothing is believed.
+  double given_std = 0.02;
   void validate() const;
 };
 

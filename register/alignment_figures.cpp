@@ -9,7 +9,6 @@ namespace scanview {
 namespace {
 
 constexpr double kMinNormalCosine = 0.34;
-constexpr std::size_t kMaxSamples = 20000;
 
 struct OneWay {
   std::size_t asked = 0;
@@ -19,9 +18,7 @@ struct OneWay {
 OneWay measure_one_way(RangeImage const& image, ViewSurface const& from, ViewSurface const& to,
                        Eigen::Isometry3d const& to_from_from, double gate) {
   OneWay result;
-  std::size_t const step = std::max<std::size_t>(1, from.samples.size() / kMaxSamples);
-  for (std::size_t i = 0; i < from.samples.size(); i += step) {
-    SurfaceSample const& sample = from.samples[i];
+  for (SurfaceSample const& sample : from.samples) {
     ++result.asked;
     Eigen::Vector3d const raw = image.has_depth(sample.x, sample.y) ? image.point(sample.x, sample.y) : sample.point;
     Eigen::Vector3d const p = to_from_from * raw;

@@ -115,6 +115,29 @@ struct PairCost {
   }
 };
 
+// A pose's distance from what it was believed to be.
+struct BeliefCost {
+  Eigen::Isometry3d believed_from_camera;  // inverse(believed) * pose, in camera coordinates
+  Eigen::Vector3d centroid;
+  double radius, std;
+
+  template <typename T>
+  bool operator()(T const* twist, T* residual) const {
+    Increment<T> const increment(twist, centroid, radius);
+    Eigen::Matrix<T, 3, 3> const rotation = believed_from_camera.linear().cast<T>() * increment.rotation;
+    Eigen::Matrix<T, 3, 1> const moved =
+        believed_from_camera.linear().cast<T>() * (increment.rotation * centroid.cast<T>() + increment.translation) +
+        believed_from_camera.translation().cast<T>() - centroid.cast<T>();
+    T axis[3];
+    ceres::RotationMatrixToAngleAxis(rotation.data(), axis);
+    for (int k = 0; k < 3; ++k) {
+      residual[k] = axis[k] * radius / std;
+      residual[k + 3] = moved[k] / std;
+    }
+    return true;
+  }
+};
+
 std::string direction_text(Eigen::Vector3d direction) {
   Eigen::Index largest = 0;
   direction.cwiseAbs().maxCoeff(&largest);
@@ -204,6 +227,13 @@ JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum
   for (std::size_t i = 0; i < n; ++i)
     if (problem.fixed[i] && ceres_problem.HasParameterBlock(twists[i].data()))
       ceres_problem.SetParameterBlockConstant(twists[i].data());
+  for (std::size_t i = 0; i < problem.believed.size() && problem.belief_std > 0; ++i) {
+    if (problem.fixed[i] || !ceres_problem.HasParameterBlock(twists[i].data())) continue;
+    auto* const cost = new BeliefCost{problem.believed[i].inverse() * problem.object_from_camera[i],
+                                      problem.centroids[i], problem.radius, problem.belief_std};
+    ceres_problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BeliefCost, 6, 6>(cost), nullptr, twists[i].data());
+  }
+  JointStep step{problem.object_from_camera, 0, 0};
   if (ceres_problem.NumResidualBlocks() > 0) {
     ceres::Solver::Options options;
     options.num_threads = 1;
@@ -213,12 +243,12 @@ JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum
     options.max_num_iterations = loss == PairLoss::cauchy ? 100 : 10;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &ceres_problem, &summary);
+    step.gain = 2 * (summary.initial_cost - summary.final_cost);
   }
   Eigen::VectorXd all(static_cast<Eigen::Index>(6 * n));
   for (std::size_t i = 0; i < n; ++i) all.segment<6>(static_cast<Eigen::Index>(6 * i)) = twists[i];
   if (spectrum.free_motions.cols() > 0)
     all -= (spectrum.free_motions * (spectrum.free_motions.transpose() * all)).eval();
-  JointStep step{problem.object_from_camera, 0};
   for (std::size_t i = 0; i < n; ++i) {
     Vector6d const twist = all.segment<6>(static_cast<Eigen::Index>(6 * i));
     if (!twist.allFinite() || problem.fixed[i]) continue;

@@ -59,13 +59,13 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
   Eigen::Matrix3d const b_from_to =
       forward ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : Eigen::Matrix3d(b_from_a.linear());
   bool const use_tone = options.use == MatchOptions::Use::shape_and_tone && !from.tone.empty() && !to.tone.empty();
-  std::size_t const step = std::max<std::size_t>(1, from.samples.size() / options.max_samples);
+  SampleGrid const grid(from, options.max_samples);
   double const sign = forward ? 1 : -1;
   double last_shape = 0, last_tone = 0;
   SurfaceSample const* last = nullptr;
   bool last_has_tone = false;
-  for (std::size_t i = 0; i < from.samples.size(); i += step) {
-    SurfaceSample const& sample = from.samples[i];
+  for (SurfaceSample const& sample : from.samples) {
+    if (!grid.contains(sample) || sample.crease) continue;
     ++asked;
     sums.cost_samples += 1;
     sums.cost += 1;
@@ -73,7 +73,7 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
     SurfaceHit hit;
     if (!look_up(to, p, hit)) continue;
     Eigen::Vector3d const normal_from = to_from_from.linear() * sample.normal;
-    if (normal_from.dot(hit.normal) < options.min_normal_cos) continue;
+    if (hit.crease || normal_from.dot(hit.normal) < options.min_normal_cos) continue;
     double const distance = hit.normal.dot(p - hit.point);
     Eigen::Vector3d const ray = to.camera.ray_direction(hit.pixel.x(), hit.pixel.y()).normalized();
     double const cosine = -hit.normal.dot(ray);
@@ -102,7 +102,7 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
     sums.matched += 1;
     double cost = std::min(1.0, std::pow(distance / (options.gate * cosine), 2));
 
-    bool const adjacent = last != nullptr && last->y == sample.y && sample.x - last->x <= from.stride;
+    bool const adjacent = last != nullptr && last->y == sample.y && sample.x - last->x == grid.pitch();
     if (adjacent) {
       form.geometry.product += std::clamp(scaled, -3.0, 3.0) * last_shape;
       form.geometry.square += (std::pow(std::clamp(scaled, -3.0, 3.0), 2) + last_shape * last_shape) / 2;
@@ -192,6 +192,7 @@ bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p, SurfaceHit& h
   hit.point = surface.camera.unproject(hit.pixel.x(), hit.pixel.y(), z);
   int const x = static_cast<int>(std::lround(hit.pixel.x())), y = static_cast<int>(std::lround(hit.pixel.y()));
   hit.sigma = surface.sigma(y, x);
+  hit.crease = surface.crease(y, x) != 0;
   return true;
 }
 
@@ -239,14 +240,15 @@ PairOverlap measure_overlap(ViewSurface const& a, ViewSurface const& b, Eigen::I
                             MatchOptions const& options) {
   auto const one_way = [&](ViewSurface const& from, ViewSurface const& to, Eigen::Isometry3d const& to_from_from,
                            std::size_t& hits) {
-    std::size_t const step = std::max<std::size_t>(1, from.samples.size() / options.max_samples);
+    SampleGrid const grid(from, options.max_samples);
     std::size_t asked = 0, met = 0;
-    for (std::size_t i = 0; i < from.samples.size(); i += step) {
+    for (SurfaceSample const& sample : from.samples) {
+      if (!grid.contains(sample)) continue;
       ++asked;
       SurfaceHit hit;
-      Eigen::Vector3d const p = to_from_from * from.samples[i].point;
+      Eigen::Vector3d const p = to_from_from * sample.point;
       if (!look_up(to, p, hit)) continue;
-      if ((to_from_from.linear() * from.samples[i].normal).dot(hit.normal) < options.min_normal_cos) continue;
+      if ((to_from_from.linear() * sample.normal).dot(hit.normal) < options.min_normal_cos) continue;
       if (std::abs(p.z() - hit.point.z()) <= options.gate) ++met;
     }
     hits += met;

@@ -79,6 +79,7 @@ struct SurfaceHit {
   Eigen::Vector3d point, normal;
   Eigen::Vector2d pixel;
   double sigma = 0;
+  bool crease = false;
 };
 /// False where the point falls outside or on no surface.
 bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p_camera, SurfaceHit& hit);

@@ -25,8 +25,8 @@ struct CloudWithEdges {
 };
 
 // A sample is at an edge where one of its neighbours on the grid of samples has no surface.
-bool is_edge(ViewSurface const& surface, SurfaceSample const& sample) {
-  int const reach = std::max(2, surface.stride);
+bool is_edge(ViewSurface const& surface, SurfaceSample const& sample, int pitch) {
+  int const reach = std::max(2, pitch);
   for (auto const& [dx, dy] : {std::pair{-reach, 0}, {reach, 0}, {0, -reach}, {0, reach}}) {
     int const x = sample.x + dx, y = sample.y + dy;
     if (x < 0 || y < 0 || x >= surface.depth.cols || y >= surface.depth.rows) return true;
@@ -39,14 +39,14 @@ bool is_edge(ViewSurface const& surface, SurfaceSample const& sample) {
 CloudWithEdges make_cloud(ViewSurface const& surface, Eigen::Isometry3d const& pose, Eigen::Vector3d const& origin,
                           IcpOptions const& options) {
   CloudWithEdges result;
-  std::size_t const step = std::max<std::size_t>(1, surface.samples.size() / options.max_samples);
-  for (std::size_t i = 0; i < surface.samples.size(); i += step) {
-    SurfaceSample const& sample = surface.samples[i];
+  SampleGrid const grid(surface, options.max_samples);
+  for (SurfaceSample const& sample : surface.samples) {
+    if (!grid.contains(sample)) continue;
     pcl::PointNormal point;
     point.getVector3fMap() = ((pose * sample.point - origin) / options.radius).cast<float>();
     point.getNormalVector3fMap() = (pose.linear() * sample.normal).cast<float>();
     result.cloud->push_back(point);
-    result.edge.push_back(is_edge(surface, sample));
+    result.edge.push_back(is_edge(surface, sample, grid.pitch()));
   }
   return result;
 }

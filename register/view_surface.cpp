@@ -13,6 +13,7 @@ namespace {
 constexpr double kMinCosine = 0.15;         // beyond 81 degrees a pixel says little about where the surface is
 constexpr double kMaxSlope = 4.0;           // depth a pixel's width, of one surface
 constexpr double kTargetSlopeNoise = 0.04;  // radians: the window grows until normals are about this good
+constexpr double kCreaseMisfit = 0.15;      // of a pixel's width: what a plane may be off where the surface is smooth
 constexpr int kMinLevelSide = 40;
 constexpr float kToneBlur = 6.0f;  // pixels of the level
 
@@ -120,6 +121,12 @@ std::optional<double> window_center(Level const& level, int x, int y) {
   return mean;
 }
 
+// `squares`: sum of the squared linear depths of the window less their plane's.
+bool is_crease(Level const& level, double squares, int count, double z, double sigma) {
+  double const misfit = std::sqrt(std::max(0.0, squares) / count) * (level.camera.is_perspective() ? z * z : 1.0);
+  return misfit > std::hypot(2 * sigma, kCreaseMisfit * level.camera.pixel_size(z));
+}
+
 void fit_pixel(Level const& level, int radius, int x, int y, ViewSurface& surface) {
   auto const center = window_center(level, x, y);
   if (!center) return;
@@ -127,7 +134,7 @@ void fit_pixel(Level const& level, int radius, int x, int y, ViewSurface& surfac
   double const pixel = camera.pixel_size(*center);
   Eigen::Matrix3d normal_matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double sigma_sum = 0;
+  double sigma_sum = 0, squares = 0;
   int count = 0;
   double const scale = linear_depth(camera, *center);
   for (int v = std::max(0, y - radius); v <= std::min(level.depth.rows - 1, y + radius); ++v)
@@ -139,7 +146,9 @@ void fit_pixel(Level const& level, int radius, int x, int y, ViewSurface& surfac
       if (std::abs(z - *center) > reach + 4 * level.sigma(v, u)) continue;
       Eigen::Vector3d const row(1, du, dv);
       normal_matrix += row * row.transpose();
-      right += row * (linear_depth(camera, z) - scale);
+      double const difference = linear_depth(camera, z) - scale;
+      right += row * difference;
+      squares += difference * difference;
       sigma_sum += level.sigma(v, u);
       ++count;
     }
@@ -161,10 +170,14 @@ void fit_pixel(Level const& level, int radius, int x, int y, ViewSurface& surfac
     normal = Eigen::Vector3d(plane[1] * camera.fx(), plane[2] * camera.fy(), -1);
   normal.normalize();
   if (-normal.dot(camera.ray_direction(x, y).normalized()) < kMinCosine) return;
-  surface.depth(y, x) = static_cast<float>(z);
+  // The plane is right about direction, but cuts off curvature, the more so the more a view sees at a slant: that would
+  // pull views together. So depths stay as they were measured, and the plane only fills holes.
+  float const own = level.depth(y, x);
+  surface.depth(y, x) = std::isfinite(own) ? own : static_cast<float>(z);
   surface.normal(y, x) =
       cv::Vec3f(static_cast<float>(normal.x()), static_cast<float>(normal.y()), static_cast<float>(normal.z()));
   surface.sigma(y, x) = static_cast<float>(sigma_sum / count);
+  if (is_crease(level, squares - plane.dot(right), count, z, sigma_sum / count)) surface.crease(y, x) = 255;
 }
 
 void add_tone(Level const& level, ViewSurface& surface) {
@@ -201,21 +214,26 @@ void gather_samples(Level const& level, std::size_t max_samples, ViewSurface& su
       float const z = surface.depth(y, x);
       if (!std::isfinite(z) || !std::isfinite(level.depth(y, x))) continue;
       cv::Vec3f const& n = surface.normal(y, x);
-      SurfaceSample sample{surface.camera.unproject(x, y, z), {n[0], n[1], n[2]}, surface.sigma(y, x), nan_f(), x, y};
+      SurfaceSample sample{surface.camera.unproject(x, y, z), {n[0], n[1], n[2]}, surface.sigma(y, x), nan_f(), x, y,
+                           surface.crease(y, x) != 0};
       if (!surface.tone.empty()) sample.tone = surface.tone(y, x);
       surface.samples.push_back(sample);
     }
 }
 
-ViewSurface fit_surface(Level const& level) {
+ViewSurface fit_surface(Level const& level, bool finest) {
   ViewSurface surface;
   surface.camera = level.camera;
   surface.depth = cv::Mat1f(level.depth.size(), nan_f());
   surface.normal = cv::Mat3f(level.depth.size(), cv::Vec3f::all(nan_f()));
   surface.sigma = cv::Mat1f(level.depth.size(), nan_f());
+  surface.crease = cv::Mat1b(level.depth.size(), uchar{0});
   int const radius = window_radius(level);
   for (int y = 0; y < level.depth.rows; ++y)
     for (int x = 0; x < level.depth.cols; ++x) fit_pixel(level, radius, x, y, surface);
+  // On a coarse level, and on a surface that is rough everywhere, there is nothing better to be had.
+  int const creased = cv::countNonZero(surface.crease), all = cv::countNonZero(surface.depth == surface.depth);
+  if (!finest || creased > all / 2) surface.crease.setTo(0);
   return surface;
 }
 
@@ -250,6 +268,12 @@ bool is_only_shading(Level const& level, ViewSurface const& surface) {
 
 }  // namespace
 
+SampleGrid::SampleGrid(ViewSurface const& surface, std::size_t at_most) {
+  int factor = 1;
+  while (surface.samples.size() > at_most * static_cast<std::size_t>(factor * factor)) ++factor;
+  pitch_ = factor * surface.stride;
+}
+
 SurfacePyramid build_pyramid(RangeImage const& image, PyramidOptions const& options) {
   SurfacePyramid pyramid;
   Level level = finest_level(image);
@@ -260,7 +284,7 @@ SurfacePyramid build_pyramid(RangeImage const& image, PyramidOptions const& opti
     if (l + 1 >= options.levels || side / 2 < kMinLevelSide) break;
     level = coarser(level);
   }
-  for (Level const& l : levels) pyramid.levels.push_back(fit_surface(l));
+  for (Level const& l : levels) pyramid.levels.push_back(fit_surface(l, pyramid.levels.empty()));
   bool const colored = !image.color.empty() && !is_only_shading(levels.back(), pyramid.levels.back());
   for (std::size_t l = 0; l < levels.size(); ++l) {
     if (colored) add_tone(levels[l], pyramid.levels[l]);

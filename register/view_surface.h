@@ -15,6 +15,7 @@ struct SurfaceSample {
   float sigma = 0;         ///< of the depth, units
   float tone = 0;          ///< see ViewSurface::tone; NaN where there is none
   int x = 0, y = 0;        ///< pixel
+  bool crease = false;     ///< see ViewSurface::crease
 };
 
 /// One view at one level of its pyramid, as registration sees it: a plane is fitted around every pixel (in inverse
@@ -22,15 +23,29 @@ struct SurfaceSample {
 /// leaves out pixels at outlines and steps, whose window is supported from one side only.
 struct ViewSurface {
   Camera camera;
-  cv::Mat1f depth;   ///< of the fitted plane at the pixel; NaN: no surface, or an outline
+  cv::Mat1f depth;   ///< as measured; in holes, of the fitted plane; NaN: no surface, or an outline
   cv::Mat3f normal;  ///< unit, towards the camera
   cv::Mat1f sigma;   ///< of the depth, units
+  /// Not 0 where the surface bends so sharply within the window that its plane is no tangent (finest level only): the
+  /// normal there would hold motions that the surface does not hold.
+  cv::Mat1b crease;
   /// Logarithm of the brightness less its blur (a few pixels), so that shading and gain, which multiply, drop out. NaN
   /// outside the object; empty where the view has no colour, or only shading.
   cv::Mat1f tone;
   cv::Mat2f tone_gradient;             ///< a pixel
   std::vector<SurfaceSample> samples;  ///< row by row on a square grid of `stride` pixels
   int stride = 1;
+};
+
+/// Every sample, or those of a coarser square grid, so that about `at_most` remain.
+class SampleGrid {
+ public:
+  SampleGrid(ViewSurface const& surface, std::size_t at_most);
+  bool contains(SurfaceSample const& sample) const { return sample.x % pitch_ == 0 && sample.y % pitch_ == 0; }
+  int pitch() const { return pitch_; }  ///< pixels between neighbours
+
+ private:
+  int pitch_;
 };
 
 /// Level 0 is the finest. A view without depths has levels without samples.

@@ -56,19 +56,21 @@ TEST(PairForm, ToneAloneHoldsAPlane) {
   printed.color = scene::print;
   Camera const camera = Camera::perspective(120, 120, 200, 200, 59.5, 59.5);
   Eigen::Isometry3d const pose = scene::look_at_origin({0, 0, -4});
+  // Each view with its own noise: the same noise twice would hold the plane by itself.
   SurfacePyramid const view = build_pyramid(scene::capture(printed, camera, pose, Noise{0.001, 1, 0, 2}));
+  SurfacePyramid const other = build_pyramid(scene::capture(printed, camera, pose, Noise{0.001, 1, 0, 3}));
   MatchOptions options;
   options.gate = 0.1;
   Vector6d off = Vector6d::Zero();
   off[3] = 0.01;  // half a pixel
   options.use = MatchOptions::Use::shape;
   EXPECT_EQ(
-      match_pair(view.levels[0], view.levels[0], motion(off, view.centroid, 1), view.centroid, view.centroid, options)
+      match_pair(view.levels[0], other.levels[0], motion(off, view.centroid, 1), view.centroid, view.centroid, options)
           .held,
       3);
   options.use = MatchOptions::Use::shape_and_tone;
   PairForm const form =
-      match_pair(view.levels[0], view.levels[0], motion(off, view.centroid, 1), view.centroid, view.centroid, options);
+      match_pair(view.levels[0], other.levels[0], motion(off, view.centroid, 1), view.centroid, view.centroid, options);
   EXPECT_EQ(form.held, 0);
   Vector6d const step = -form.information.ldlt().solve(form.gradient);
   EXPECT_NEAR(step[3], -0.01, 0.002);
