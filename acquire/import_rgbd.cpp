@@ -37,6 +37,7 @@ cv::Mat1f read_depth(std::filesystem::path const& path, RgbdSource const& source
 }
 
 RawView load(RgbdFrame const& frame, RgbdSource const& source, DepthNoise const& noise) {
+  if (!frame.problem.empty()) throw Error(ErrorCode::bad_input, {}, frame.problem);
   RawView raw;
   raw.camera = source.color.camera;
   raw.object_from_camera = frame.pose;

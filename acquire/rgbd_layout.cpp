@@ -43,13 +43,19 @@ std::vector<std::string> words_of(std::string const& line) {
   return words;
 }
 
-/// Finite numbers only: "nan" in a trajectory or a calibration is an error at its line.
-double number(std::string const& word, fs::path const& path, std::size_t line) {
+/// "nan" and "inf" are numbers here: one bad pose costs one view.
+double any_number(std::string const& word, fs::path const& path, std::size_t line) {
   double value = 0;
   char const* const begin = word.data() + (word.starts_with('+') ? 1 : 0);
   auto const [end, problem] = std::from_chars(begin, word.data() + word.size(), value);
-  if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-    fail(path, fmt::format("line {}: '{}' is no finite number", line, word.substr(0, 40)));
+  if (problem != std::errc() || end != word.data() + word.size())
+    fail(path, fmt::format("line {}: '{}' is no number", line, word.substr(0, 40)));
+  return value;
+}
+
+double number(std::string const& word, fs::path const& path, std::size_t line) {
+  double const value = any_number(word, path, line);
+  if (!std::isfinite(value)) fail(path, fmt::format("line {}: '{}' is not finite", line, word));
   return value;
 }
 
@@ -153,6 +159,7 @@ std::optional<std::size_t> nearest_in_time(std::vector<Entry> const& entries, do
 struct StampedPose {
   double time;
   Eigen::Isometry3d pose;
+  std::string problem;
 };
 
 std::vector<StampedPose> read_trajectory(fs::path const& path) {
@@ -160,10 +167,14 @@ std::vector<StampedPose> read_trajectory(fs::path const& path) {
   for (auto const& [line, words] : table_of(path)) {
     if (words.size() < 8) fail(path, fmt::format("line {} is not 'time tx ty tz qx qy qz qw'", line));
     double v[8];
-    for (std::size_t i = 0; i < 8; ++i) v[i] = number(words[i], path, line);
+    for (std::size_t i = 0; i < 8; ++i) v[i] = i == 0 ? number(words[i], path, line) : any_number(words[i], path, line);
     Eigen::Quaterniond const q(v[7], v[4], v[5], v[6]);
-    if (std::abs(q.norm() - 1) > 1e-2) fail(path, fmt::format("line {}: the quaternion is no rotation", line));
-    poses.push_back({v[0], Eigen::Translation3d(v[1], v[2], v[3]) * q.normalized()});
+    Eigen::Vector3d const t(v[1], v[2], v[3]);
+    if (!t.allFinite() || !(std::abs(q.norm() - 1) <= 1e-2))
+      poses.push_back({v[0], Eigen::Isometry3d::Identity(),
+                       fmt::format("{}: line {}: the pose is not finite or no rotation", path.string(), line)});
+    else
+      poses.push_back({v[0], Eigen::Translation3d(t) * q.normalized(), {}});
   }
   std::stable_sort(poses.begin(), poses.end(), [](auto const& a, auto const& b) { return a.time < b.time; });
   return poses;
@@ -226,6 +237,7 @@ RgbdSource read_tum(fs::path const& folder) {
         continue;
       }
       frame.pose = (*poses)[*pose].pose;
+      frame.problem = (*poses)[*pose].problem;
     }
     taken[*depth] = true;
     frame.name = fmt::format("{:04d}", source.frames.size());
@@ -255,8 +267,8 @@ std::vector<fs::path> pictures_in(fs::path const& folder) {
   return files;
 }
 
-/// Open3D's trajectory: blocks of "i j k" and a 4x4 matrix, world_from_camera. A pose that is none is kept as an error
-/// message of its view.
+/// Open3D's trajectory: blocks of "i j k" and a 4x4 matrix, world_from_camera. Whether they are poses is seen view by
+/// view.
 std::vector<Eigen::Matrix4d> read_log(fs::path const& path) {
   auto const rows = table_of(path);
   if (rows.size() % 5 != 0) fail(path, "a trajectory is blocks of 5 lines");
@@ -267,7 +279,7 @@ std::vector<Eigen::Matrix4d> read_log(fs::path const& path) {
       auto const& [line, words] = rows[block + 1 + row];
       if (words.size() != 4) fail(path, fmt::format("line {} is not 4 numbers", line));
       for (std::size_t col = 0; col < 4; ++col)
-        matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(col)) = number(words[col], path, line);
+        matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(col)) = any_number(words[col], path, line);
     }
     matrices.push_back(matrix);
   }
@@ -329,8 +341,13 @@ RgbdSource read_redwood(fs::path const& folder) {
   if (matrices.size() != source.frames.size())
     fail(log, fmt::format("{} poses for {} pictures", matrices.size(), source.frames.size()));
   source.files.push_back(log);
-  for (std::size_t i = 0; i < matrices.size(); ++i)
-    source.frames[i].pose = pose_from_matrix(matrices[i], log, "pose " + std::to_string(i));
+  for (std::size_t i = 0; i < matrices.size(); ++i) {
+    try {
+      source.frames[i].pose = pose_from_matrix(matrices[i], log, fmt::format("pose {}", i));
+    } catch (Error const& error) {
+      source.frames[i].problem = error.what();
+    }
+  }
   return source;
 }
 

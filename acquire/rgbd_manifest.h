@@ -23,6 +23,7 @@ struct RgbdFrame {
   std::filesystem::path color, depth;
   std::optional<std::filesystem::path> pose_file;  ///< 4x4 text, object_from_camera
   std::optional<Eigen::Isometry3d> pose;           ///< where the pose does not come from a file of its own
+  std::string problem;                             ///< why this frame alone cannot be used; mostly empty
 };
 
 /// A sequence of colour and depth frames: what rgbd.json says, or what a known layout implies.

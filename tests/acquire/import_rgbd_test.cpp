@@ -307,6 +307,9 @@ TEST(ImportLayouts, RedwoodTrajectoryBelongsToSortedPictures) {
   ASSERT_EQ(set.views.size(), 2u);
   EXPECT_EQ(set.views[1].image.camera, small_camera());
   EXPECT_TRUE(set.views[1].object_from_camera->isApprox(some_pose(1), 1e-12));
+  write_file(folder.path() / "trajectory.log",
+             "0 0 1\n1 0 0 nan\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 1 2\n" + pose_text(some_pose(1)));
+  EXPECT_EQ(import_plainly(folder.path()).failed_views, std::vector<std::string>{"0000"});
 }
 
 }  // namespace
