@@ -1,4 +1,5 @@
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
@@ -27,20 +28,42 @@ cv::Mat1f tolerance_of_pixels(RangeImage const& image, MeshOptions const& option
   return result;
 }
 
+/// How far noise alone may be expected to change the tangent of the angle under which a triangle is seen: one sigma of
+/// a depth difference over the triangle's least height across the picture.
+double tangent_sigma(RangeImage const& image, Eigen::Vector3d const (&p)[3]) {
+  Eigen::Vector2d u[3];
+  double longest = 0;
+  for (int i = 0; i < 3; ++i) u[i] = image.camera.project(p[i]);
+  for (int i = 0; i < 3; ++i) longest = std::max(longest, (u[i] - u[(i + 1) % 3]).norm());
+  Eigen::Vector2d const a = u[1] - u[0], b = u[2] - u[0], middle = (u[0] + u[1] + u[2]) / 3;
+  double const height = std::abs(a.x() * b.y() - a.y() * b.x()) / longest * image.camera.pixel_size(p[0].z());
+  int const x = std::clamp(int(std::lround(middle.x())), 0, image.camera.width() - 1);
+  int const y = std::clamp(int(std::lround(middle.y())), 0, image.camera.height() - 1);
+  return image.has_depth(x, y) && height > 0 ? std::numbers::sqrt2 * image.sigma(y, x) / height : 0;
+}
+
 /// Keeps the triangles that are seen well enough, and the vertices they need, in their order.
-void keep_well_seen(Camera const& camera, double least_cos, TriangleMesh& mesh, std::vector<float>& cos_phi) {
+void keep_well_seen(RangeImage const& image, double max_angle_deg, TriangleMesh& mesh, std::vector<float>& cos_phi) {
+  constexpr double kExplained = 2;           // sigma
+  constexpr double kAlwaysGrazing = 0.0175;  // cosine of 89 degrees
+  double const greatest = std::tan(max_angle_deg * std::numbers::pi / 180);
+  double const least_cos = std::cos(max_angle_deg * std::numbers::pi / 180);
   std::vector<Eigen::Vector3i> kept;
   std::vector<int> new_index(mesh.vertices.size(), -1);
   for (Eigen::Vector3i const& triangle : mesh.triangles) {
-    Eigen::Vector3d const a = mesh.vertices[triangle[0]].cast<double>();
-    Eigen::Vector3d const b = mesh.vertices[triangle[1]].cast<double>();
-    Eigen::Vector3d const c = mesh.vertices[triangle[2]].cast<double>();
-    Eigen::Vector3d const normal = (b - a).cross(c - a);
-    Eigen::Vector3d const ray = camera.is_perspective() ? Eigen::Vector3d((a + b + c) / 3) : Eigen::Vector3d::UnitZ();
-    double const cosine = -normal.dot(ray) / (normal.norm() * ray.norm());
-    if (!(cosine >= least_cos)) continue;  // nor those without area
+    Eigen::Vector3d p[3];
+    for (int i = 0; i < 3; ++i) p[i] = mesh.vertices[triangle[i]].cast<double>();
+    Eigen::Vector3d const normal = (p[1] - p[0]).cross(p[2] - p[0]);
+    Eigen::Vector3d ray(0, 0, 1);
+    if (image.camera.is_perspective()) ray = p[0] + p[1] + p[2];
+    double const cosine = std::min(-normal.dot(ray) / (normal.norm() * ray.norm()), 1.0);
+    if (!(cosine >= least_cos)) {  // also those without area
+      if (!(cosine >= kAlwaysGrazing)) continue;
+      double const tangent = std::sqrt(1 - cosine * cosine) / cosine;
+      if (tangent - kExplained * tangent_sigma(image, p) > greatest) continue;
+    }
     kept.push_back(triangle);
-    cos_phi.push_back(float(std::min(cosine, 1.0)));
+    cos_phi.push_back(float(cosine));
     for (int i = 0; i < 3; ++i) new_index[triangle[i]] = 0;
   }
   int count = 0;
@@ -92,8 +115,7 @@ ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& opti
   cv::Mat1f const tolerance = tolerance_of_pixels(image, options, result.tolerance);
   TriangleMesh& mesh = result.view_mesh.mesh;
   mesh = triangulate_by_greedy_insertion(image, links, outline, tolerance, options.max_triangles, context);
-  keep_well_seen(image.camera, std::cos(options.max_angle_deg * std::numbers::pi / 180), mesh,
-                 result.view_mesh.cos_phi);
+  keep_well_seen(image, options.max_angle_deg, mesh, result.view_mesh.cos_phi);
 
   MeshError const error = measure_mesh(image, mesh);
   result.figures = error.figures;

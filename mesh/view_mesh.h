@@ -48,9 +48,14 @@ struct ViewMeshResult {
   double tolerance = 0;  ///< used: in units (units), or multiples of sigma
 };
 
-/// Meshes one range image: outline and step edges as constraints, greedy insertion of the worst pixel (Garland and
-/// Heckbert 1995) into a constrained Delaunay triangulation (CGAL), until every pixel is within tolerance. An image
-/// with too few depths for a triangle gives an empty mesh. n log n.
+/// Meshes one range image. The outline of what has depth and the step edges become polylines between the pixels, within
+/// half a pixel of their sides (outline.h, surface_links.h): constraints of a Delaunay triangulation (CGAL), each side
+/// with its own vertices, so that no triangle spans a step and a mesh covers exactly the object's pixels. Greedy
+/// insertion of the worst pixel (Garland and Heckbert 1995) follows until every pixel is within tolerance, measured on
+/// the single precision vertices. Automatic: three sigma, below which insertion would model the noise. Patches of
+/// fewer than min_patch_pixels and grazing triangles are left out: `uncovered` counts their pixels. The normal
+/// (b − a) × (c − a) of a triangle points towards the camera. An image with too few depths for a triangle gives an
+/// empty mesh. Where max_triangles is less than the outline needs, the outline wins. About n log n; one thread.
 ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& options, Context& context);
 
 /// mesh.ply (exact, with `cos` a triangle) and feather.png of one view; reading checks sizes and indices.

