@@ -53,7 +53,8 @@ Json hash_recorded_inputs(fs::path const& folder, fs::path const& input) {
   Json inputs = Json::object();
   try {
     fs::path const root = fs::is_directory(input) ? input : input.parent_path();
-    for (auto const& [name, hash] : read_stage_record(folder, "import").inputs.items())
+    StageRecord const record = read_stage_record(folder, "import");
+    for (auto const& [name, hash] : record.inputs.items())
       if (name != "listing") inputs[name] = hash_file(root / name);
   } catch (Error const&) {
     return Json::object();

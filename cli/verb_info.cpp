@@ -8,7 +8,6 @@
 #include "acquire/import.h"
 #include "acquire/rgbd_manifest.h"
 #include "acquire/scan_set_file.h"
-#include "acquire/stanford_conf.h"
 #include "base/error.h"
 #include "base/image_file.h"
 #include "base/ply.h"
@@ -141,7 +140,7 @@ Json info(fs::path const& path, Context& context) {
   if (ends(".exr")) return info_exr(path);
   if (ends(".glb")) return info_glb(path);
   if (ends(".json")) return info_json(path);
-  if (ends(".conf")) return {{"kind", "Stanford poses"}, {"scans", read_stanford_conf(path).size()}};
+  if (ends(".conf")) return {{"kind", "Stanford poses"}, {"import", guess_import_kind(path)}};
   if (is_archive(path)) return info_archive(path);
   if (ends(".png") || ends(".jpg") || ends(".jpeg")) {
     cv::Mat const image = read_image(path);

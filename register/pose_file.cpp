@@ -7,9 +7,10 @@
 #include <set>
 #include <sstream>
 
+#include "acquire/archive.h"
+#include "acquire/import.h"
 #include "acquire/rgbd_manifest.h"
 #include "acquire/scan_set_file.h"
-#include "acquire/stanford_conf.h"
 #include "base/error.h"
 #include "base/files.h"
 
@@ -21,15 +22,20 @@ namespace {
   throw Error(ErrorCode::bad_input, path, message);
 }
 
-void read_conf(fs::path const& path, ScanSet& set) {
-  std::map<std::string, Eigen::Isometry3d> poses;
-  for (auto const& entry : read_stanford_conf(path))
-    poses[fs::path(entry.file).stem().string()] = entry.object_from_scan;
+void take_poses_by_name(ScanSet const& other, fs::path const& path, ScanSet& set) {
   for (auto& view : set.views) {
-    auto const it = poses.find(view.name);
-    if (it == poses.end()) fail(path, fmt::format("has no pose of view {}", view.name));
-    view.object_from_camera = it->second * scan_from_camera();
+    auto const it =
+        std::find_if(other.views.begin(), other.views.end(), [&](View const& v) { return v.name == view.name; });
+    if (it == other.views.end() || !it->object_from_camera)
+      fail(path, fmt::format("has no pose of view {}", view.name));
+    view.object_from_camera = it->object_from_camera;
   }
+}
+
+/// A .conf places scans; what frame a scan's camera has, the importer knows.
+void read_conf(fs::path const& path, ScanSet& set) {
+  Context context;
+  take_poses_by_name(import_stanford(path, {}, context).set, path, set);
 }
 
 void read_aln(fs::path const& path, ScanSet& set) {
@@ -84,17 +90,6 @@ void read_rgbd(fs::path const& path, ScanSet& set) {
       set.views[i].object_from_camera = read_pose_text(*frame.pose_file);
     else
       fail(path, "says no poses");
-  }
-}
-
-void read_manifest_poses(fs::path const& path, ScanSet& set) {
-  ScanSet const other = read_manifest(path.parent_path());
-  for (auto& view : set.views) {
-    auto const it =
-        std::find_if(other.views.begin(), other.views.end(), [&](View const& v) { return v.name == view.name; });
-    if (it == other.views.end() || !it->object_from_camera)
-      fail(path, fmt::format("has no pose of view {}", view.name));
-    view.object_from_camera = it->object_from_camera;
   }
 }
 
@@ -169,12 +164,13 @@ void read_marks(fs::path const& path, Json const& marks, ScanSet& set) {
 
 void read_poses(fs::path const& path, ScanSet& set) {
   std::string const ending = path.extension().string();
-  if (ending == ".conf") return read_conf(path, set);
+  if (ending == ".conf" || is_archive(path)) return read_conf(path, set);
   if (ending == ".aln") return read_aln(path, set);
   if (ending != ".json") return read_tum(path, set);
   Json const json = read_json(path);
   if (json.is_object() && json.contains("marks")) return read_marks(path, json["marks"], set);
-  if (json.is_object() && json.contains("format")) return read_manifest_poses(path, set);
+  if (json.is_object() && json.contains("format"))
+    return take_poses_by_name(read_manifest(path.parent_path()), path, set);
   read_rgbd(path, set);
 }
 

@@ -6,7 +6,7 @@
 namespace scanview {
 
 /// Takes the poses of `set`'s views from another program's file (the images are needed for marks only):
-///   *.conf        Stanford: "bmesh NAME.ply tx ty tz qx qy qz qw" of scans imported by `import stanford`
+///   *.conf        Stanford: of scans that `import stanford` has read (or their archive); the scans lie beside it
 ///   *.aln         MeshLab: number of meshes, then NAME, '#', four rows of world_from_mesh
 ///   *.json        a scanset.json (views by name), an rgbd.json (frames in order), or marks:
 ///                 {"marks": {"VIEW": {"POINT": [u, v], ...}, ...}}: points named in two views or more, as pixels with
