@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "base/error.h"
@@ -57,6 +58,9 @@ class Aligner {
   JointProblem problem_;
   ViewGraph graph_;
   Scales scales_;
+  /// A pair's own scales, where they exceed everybody's: pairs that stand apart would else be taken for outliers as a
+  /// whole, and a tear would never heal.
+  std::map<std::pair<std::size_t, std::size_t>, Scales> pair_scales_;
   Alignment result_;
 
   ViewSurface const& surface(std::size_t view, std::size_t level) const {
@@ -161,9 +165,20 @@ class Aligner {
       ViewGraphEdge const& edge = graph_.edges[e];
       Eigen::Isometry3d const b_from_a =
           problem_.object_from_camera[edge.b].inverse() * problem_.object_from_camera[edge.a];
+      MatchOptions own = match;
+      if (auto const known = pair_scales_.find({edge.a, edge.b}); known != pair_scales_.end()) {
+        own.geometry_scale = std::max(own.geometry_scale, known->second.geometry);
+        own.gate = std::clamp(5 * known->second.distance, own.gate, std::max(own.gate, 0.1 * radius_));
+      }
       forms[e] = match_pair(surface(edge.a, level), surface(edge.b, level), b_from_a, views_[edge.a].centroid,
-                            views_[edge.b].centroid, match);
+                            views_[edge.b].centroid, own);
     });
+    for (std::size_t e = 0; e < forms.size(); ++e) {
+      std::vector<float> in_sigmas = forms[e].geometry.values, in_units = forms[e].distances;
+      Scales& own = pair_scales_[{graph_.edges[e].a, graph_.edges[e].b}];
+      own.geometry = robust_scale(in_sigmas);
+      own.distance = robust_scale(in_units);
+    }
     ResidualFigures geometry, tone;
     std::vector<float> distances;
     auto const append = [](ResidualFigures& all, ResidualFigures const& one) {
@@ -209,6 +224,7 @@ class Aligner {
       double const pixel = median_pixel(level);
       int const rounds = level > 0 ? std::max(2, options_.max_iterations / 5) : options_.max_iterations;
       scales_ = {};
+      pair_scales_.clear();
       for (int round = 0; round < rounds && result_.iterations < options_.max_iterations; ++round) {
         context_.check_cancelled();
         if (round % 4 == 0) {
@@ -230,7 +246,9 @@ class Aligner {
                         scales_.geometry_correlation, scales_.tone, scales_.tone_correlation, gate));
         context_.progress("register: refine", static_cast<std::size_t>(result_.iterations),
                           static_cast<std::size_t>(options_.max_iterations));
-        bool const settled = step.largest < (level > 0 ? 0.1 : 0.02) * pixel || step.gain < kSettledGain;
+        // A small gain alone says little while misfit itself correlates the residuals: the step must be small as well.
+        bool const settled = step.largest < (level > 0 ? 0.1 : 0.004) * pixel ||
+                             (step.gain < kSettledGain && step.largest < 0.03 * pixel);
         if (settled && level == 0) result_.status = AlignmentStatus::converged;
         if (settled) break;
       }

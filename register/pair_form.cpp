@@ -149,15 +149,19 @@ int hold_free_motions(Sums const& sums, Matrix6d& information, Vector6d& gradien
   double const normal_variance = sums.normal_difference / sums.matched / 4;  // an axis of one view's normals
   double const independent = std::max(1.0, sums.matched / 25);               // windows overlap
   double const noise = 4 * normal_variance / std::sqrt(independent);
-  Matrix6d projector = Matrix6d::Identity();
+  double const threshold = std::max(1e-5, noise);
+  // A motion comes in gradually above the threshold, so that two linearisations do not take turns.
+  Matrix6d root = Matrix6d::Zero(), share = Matrix6d::Zero();
   int held = 0;
-  for (int k = 0; k < 6; ++k)
-    if (spectrum.eigenvalues()[k] < std::max(1e-5, noise)) {
-      projector -= spectrum.eigenvectors().col(k) * spectrum.eigenvectors().col(k).transpose();
-      ++held;
-    }
-  information = projector * information * projector;
-  gradient = projector * gradient;
+  for (int k = 0; k < 6; ++k) {
+    double const trust = std::clamp(spectrum.eigenvalues()[k] / threshold - 1, 0.0, 2.0) / 2;
+    if (trust == 0) ++held;
+    Matrix6d const outer = spectrum.eigenvectors().col(k) * spectrum.eigenvectors().col(k).transpose();
+    root += std::sqrt(trust) * outer;
+    share += trust * outer;
+  }
+  information = root * information * root;
+  gradient = share * gradient;
   return held;
 }
 
