@@ -20,6 +20,7 @@ constexpr double kUnsureNearStep = 0.1;  // what a depth is worth next to a step
 constexpr double kShading = 0.04;        // by which the object's shadow may change the background's brightness
 constexpr double kNoDepth = 1;           // what has none is sooner a shadow of the sensor's beside the object
 constexpr int kStepReach = 8;            // pixels
+constexpr double kSmallestSurface = 0.01;  // of the object's largest
 constexpr double kSmoothness = 6;        // price of a mask border across a pair of equal colours
 
 /// (background - depth) / sigma: positive in front of it. NaN where either is missing.
@@ -247,6 +248,9 @@ std::size_t apply_mask(RangeImage& image, cv::Mat1b const& mask, cv::Mat1f const
     }
   std::vector<int> sizes;
   cv::Mat1i const labels = surface_pieces(image, sizes);
+  // A surface of its own that is this small beside the object's largest is more often a scrap of the background that
+  // noise lifted than a part of the object; where it is one, other views see it at better size.
+  int const smallest = static_cast<int>(kSmallestSurface * *std::max_element(sizes.begin(), sizes.end()));
   std::vector<int> in_front(sizes.size(), 0);
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x)
@@ -254,7 +258,7 @@ std::size_t apply_mask(RangeImage& image, cv::Mat1b const& mask, cv::Mat1f const
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x) {
       auto const label = static_cast<std::size_t>(labels(y, x));
-      if (label > 0 && in_front[label] * 2 < sizes[label]) image.remove(x, y, PixelClass::outlier);
+      if (label > 0 && (in_front[label] * 2 < sizes[label] || sizes[label] < smallest)) image.remove(x, y, PixelClass::outlier);
     }
   remove_outliers(image);
   return before - image.count_depths();

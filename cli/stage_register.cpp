@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "cli/stages.h"
 #include "register/pose_file.h"
+#include "viewer/blend/exposure.h"
 
 namespace scanview {
 namespace fs = std::filesystem;
@@ -102,6 +103,7 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
   for (auto const& view : manifest.views) cameras.push_back(view.image.camera.to_json());
   StageRecord record{"register", to_json(request.options), image_hashes(folder, manifest), {}, {}};
   record.options["start"] = static_cast<int>(request.start);
+  record.options["exposure"] = request.exposure;
   record.options["seed"] = context.seed;
   record.inputs["scanset.json#cameras"] = hash_bytes(cameras.dump());
   record.inputs["scanset.json#initial_poses"] = hash_bytes(initial.dump());
@@ -129,6 +131,10 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
     set.error_budget.registration = alignment.error;
     set.error_budget.approximation = {};  // the meshes' turn comes after this
 
+    if (request.exposure != 0) {
+      auto const gains = estimate_gains(set, {}, context);
+      for (std::size_t i = 0; i < set.views.size(); ++i) set.views[i].gain = gains[i];
+    }
     write_json(folder / "poses.json", {{"initial", initial}, {"registered", poses_json(set)}});
     write_manifest(folder, set);
     out.figures = figures_of(set, alignment);

@@ -84,10 +84,11 @@ RegisterRequest resolve(RegisterFlags const& flags, std::vector<std::string> con
     if (!std::filesystem::exists(request.pose_file))
       throw Error(ErrorCode::usage, {}, fmt::format("--init {}: neither a way to start nor a file", flags.init));
   }
-  apply_settings(settings, "register",
-                 {integer_setting("levels", request.options.levels),
-                  integer_setting("max_iterations", request.options.max_iterations),
-                  number_setting("min_overlap", request.options.min_overlap)});
+  apply_settings(
+      settings, "register",
+      {integer_setting("levels", request.options.levels),
+       integer_setting("max_iterations", request.options.max_iterations),
+       number_setting("min_overlap", request.options.min_overlap), integer_setting("exposure", request.exposure)});
   request.options.validate();
   return request;
 }

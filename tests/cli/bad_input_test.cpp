@@ -1,4 +1,5 @@
 // What the command says, how it exits and what it leaves behind where its input or its surroundings are bad.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -27,8 +28,7 @@ class BadInput : public ::testing::Test {
     manifest_ =
         Json::parse(R"({"color": "c{}.png", "depth": "d{}.png", "first": 0, "last": 1, "depth_unit": 0.001, "unit": "m",
       "missing": [0], "poses": "p{}.txt", "intrinsics": {"width": 40, "height": 30, "fx": 50, "fy": 50, "cx": 20, "cy": 15}})");
-    for (int i = 0; i < 2; ++i)
-      write_file(input_ / ("p" + std::to_string(i) + ".txt"), "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+    for (int i = 0; i < 2; ++i) write_file(input_ / fmt::format("p{}.txt", i), "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
     write_manifest();
   }
   void write_frame(int i, int width, int height) {
@@ -39,8 +39,8 @@ class BadInput : public ::testing::Test {
         color(y, x) = cv::Vec3b(static_cast<std::uint8_t>(5 * x), static_cast<std::uint8_t>(7 * y), 90);
         depth(y, x) = static_cast<std::uint16_t>(1000 + 2 * x + y);
       }
-    write_file(input_ / ("c" + std::to_string(i) + ".png"), encode_png(color));
-    write_file(input_ / ("d" + std::to_string(i) + ".png"), encode_png(depth));
+    write_file(input_ / fmt::format("c{}.png", i), encode_png(color));
+    write_file(input_ / fmt::format("d{}.png", i), encode_png(depth));
   }
   void write_manifest() { write_file(input_ / "rgbd.json", manifest_.dump()); }
   void truncate(std::string const& name) {
