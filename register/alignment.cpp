@@ -20,7 +20,8 @@ namespace {
 
 constexpr double kMinScale = 1e-3;  // of residuals, in sigmas: views may agree perfectly
 constexpr double kMinToneScale = 5e-3;
-constexpr double kSettledGain = 0.05;  // of the cost, in variances: a fifth of one standard deviation
+constexpr double kSettledStep = 0.1;  // of a pose's own standard deviation
+constexpr int kScaleRounds = 4;       // of a level, in which scales, gates and neighbours are still measured
 
 // What one linearisation measured over all pairs; the next one weighs by it.
 struct Scales {
@@ -149,8 +150,10 @@ class Aligner {
     }
   }
 
-  // All pairs matched at the present poses; measures the scales for the next time.
-  std::vector<PairForm> match_all(std::size_t level, double gate) {
+  // All pairs matched at the present poses; measures the scales for the next time, unless they are to stay: poses and
+  // scales that follow each other (views that drift apart loosen the scale which held them) never come to rest.
+  enum class ScaleUse { measure, keep };
+  std::vector<PairForm> match_all(std::size_t level, double gate, ScaleUse use = ScaleUse::measure) {
     MatchOptions match;
     match.gate = gate;
     match.radius = radius_;
@@ -173,6 +176,7 @@ class Aligner {
       forms[e] = match_pair(surface(edge.a, level), surface(edge.b, level), b_from_a, views_[edge.a].centroid,
                             views_[edge.b].centroid, own);
     });
+    if (use == ScaleUse::keep) return forms;
     for (std::size_t e = 0; e < forms.size(); ++e) {
       std::vector<float> in_sigmas = forms[e].geometry.values, in_units = forms[e].distances;
       Scales& own = pair_scales_[{graph_.edges[e].a, graph_.edges[e].b}];
@@ -217,6 +221,36 @@ class Aligner {
     return sizes[sizes.size() / 2];
   }
 
+  // How much of a step is taken: less where it takes back the one before (each linearisation goes too far where tones
+  // are steeper than their smoothed gradients), so that the two do not take turns.
+  double step_share(JointStep const& last, JointStep const& step, double share) const {
+    if (last.twists.empty()) return 1;
+    double product = 0, squares = 0;
+    for (std::size_t i = 0; i < step.twists.size(); ++i) {
+      product += last.twists[i].dot(step.twists[i]);
+      squares += last.twists[i].squaredNorm();
+    }
+    return product < -0.25 * squares ? std::max(0.25, share / 2) : std::min(1.0, share * 1.2);
+  }
+
+  void take(JointStep const& step, double share) {
+    for (std::size_t i = 0; i < step.twists.size(); ++i)
+      problem_.object_from_camera[i] =
+          problem_.object_from_camera[i] * motion(share * step.twists[i], views_[i].centroid, radius_);
+  }
+
+  // The largest step of a view, turn or slide, in its own standard deviations.
+  double in_deviations(JointStep const& step, JointSpectrum const& spectrum) const {
+    double largest = 0;
+    for (std::size_t i = 0; i < step.twists.size(); ++i)
+      for (int part : {0, 3}) {
+        auto const at = static_cast<Eigen::Index>(6 * i) + part;
+        double const variance = spectrum.covariance.block<3, 3>(at, at).trace();
+        if (variance > 0) largest = std::max(largest, step.twists[i].segment<3>(part).norm() / std::sqrt(variance));
+      }
+    return largest;
+  }
+
   void refine() {
     double gate = 0.1 * radius_;
     result_.status = AlignmentStatus::not_converged;
@@ -225,30 +259,36 @@ class Aligner {
       int const rounds = level > 0 ? std::max(2, options_.max_iterations / 5) : options_.max_iterations;
       scales_ = {};
       pair_scales_.clear();
+      JointStep last;
+      double share = 1;
       for (int round = 0; round < rounds && result_.iterations < options_.max_iterations; ++round) {
         context_.check_cancelled();
-        if (round % 4 == 0) {
+        bool const measures = round < kScaleRounds;
+        if (round % kScaleRounds == 0 && round <= kScaleRounds) {
           update_graph(std::max<std::size_t>(level, std::min<std::size_t>(1, coarsest_)), gate);
           problem_.fixed = fixed_views();
           if (graph_.edges.empty()) return;
         }
-        if (round == 0) match_all(level, gate);  // the scales
-        gate = std::clamp(5 * scales_.distance, std::min(gate, 1.5 * pixel), gate);
-        set_pairs(match_all(level, gate));
-        JointStep const step = solve_joint(problem_, joint_spectrum(problem_), PairLoss::quadratic);
-        problem_.object_from_camera = step.object_from_camera;
+        if (round == 0 || round == kScaleRounds) match_all(level, gate);  // the scales
+        if (measures) gate = std::clamp(5 * scales_.distance, std::min(gate, 1.5 * pixel), gate);
+        set_pairs(match_all(level, gate, measures ? ScaleUse::measure : ScaleUse::keep));
+        JointSpectrum const spectrum = joint_spectrum(problem_);
+        JointStep step = solve_joint(problem_, spectrum, PairLoss::quadratic);
+        share = step_share(last, step, share);
+        double const deviations = in_deviations(step, spectrum);
+        take(step, share);
+        last = step;
         ++result_.iterations;
         context_.log(
-            fmt::format("refine: level {}, {} pairs, largest step {:.3g}, gain {:.3g}, distances {:.3g} (neighbours "
-                        "correlate {:.2f}), tones {:.3g} "
-                        "({:.2f}), gate {:.3g}",
-                        level, graph_.edges.size(), step.largest, step.gain, scales_.distance,
+            fmt::format("refine: level {}, {} pairs, largest step {:.3g} ({:.3g} std, {:.2f} taken), gain {:.3g}, "
+                        "distances {:.3g} (neighbours correlate {:.2f}), tones {:.3g} ({:.2f}), gate {:.3g}",
+                        level, graph_.edges.size(), step.largest, deviations, share, step.gain, scales_.distance,
                         scales_.geometry_correlation, scales_.tone, scales_.tone_correlation, gate));
         context_.progress("register: refine", static_cast<std::size_t>(result_.iterations),
                           static_cast<std::size_t>(options_.max_iterations));
-        // A small gain alone says little while misfit itself correlates the residuals: the step must be small as well.
+        // Far below what the data can tell, or far below what a pixel can.
         bool const settled = step.largest < (level > 0 ? 0.1 : 0.004) * pixel ||
-                             (step.gain < kSettledGain && step.largest < 0.03 * pixel);
+                             (deviations < kSettledStep && step.largest < 0.1 * pixel);
         if (settled && level == 0) result_.status = AlignmentStatus::converged;
         if (settled) break;
       }

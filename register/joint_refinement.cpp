@@ -119,24 +119,41 @@ struct PairCost {
 struct BeliefCost {
   Eigen::Isometry3d believed_from_camera;  // inverse(believed) * pose, in camera coordinates
   Eigen::Vector3d centroid;
-  double radius, std;
+  double radius;
+  Matrix6d factor;
 
   template <typename T>
   bool operator()(T const* twist, T* residual) const {
     Increment<T> const increment(twist, centroid, radius);
     Eigen::Matrix<T, 3, 3> const rotation = believed_from_camera.linear().cast<T>() * increment.rotation;
-    Eigen::Matrix<T, 3, 1> const moved =
-        believed_from_camera.linear().cast<T>() * (increment.rotation * centroid.cast<T>() + increment.translation) +
-        believed_from_camera.translation().cast<T>() - centroid.cast<T>();
+    Eigen::Matrix<T, 6, 1> deviation;
     T axis[3];
     ceres::RotationMatrixToAngleAxis(rotation.data(), axis);
-    for (int k = 0; k < 3; ++k) {
-      residual[k] = axis[k] * radius / std;
-      residual[k + 3] = moved[k] / std;
-    }
+    deviation << axis[0] * radius, axis[1] * radius, axis[2] * radius,
+        believed_from_camera.linear().cast<T>() * (increment.rotation * centroid.cast<T>() + increment.translation) +
+            believed_from_camera.translation().cast<T>() - centroid.cast<T>();
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> result(residual);
+    result = factor.cast<T>() * deviation;
     return true;
   }
 };
+
+// Belief shall act where the data says little and not pull at all where it says more: along every principal motion of a
+// view's covariance its inverse variance counts by the square of the share that an ordinary prior would have had. (As
+// an ordinary prior, a belief of a tenth of the data's weight would still pull by a tenth of an error in the start.)
+Matrix6d belief_factor(JointSpectrum const& spectrum, std::size_t view, double std) {
+  auto const at = static_cast<Eigen::Index>(6 * view);
+  Eigen::MatrixXd const open = spectrum.free_motions.middleRows(at, 6);
+  double const variance = std * std;
+  Matrix6d const covariance = spectrum.covariance.block<6, 6>(at, at) + 1e6 * variance * open * open.transpose();
+  Eigen::SelfAdjointEigenSolver<Matrix6d> const motions(covariance);
+  Matrix6d factor = Matrix6d::Zero();
+  for (int k = 0; k < 6; ++k) {
+    double const of_data = std::max(0.0, motions.eigenvalues()[k]);
+    factor.row(k) = of_data / (of_data + variance) / std * motions.eigenvectors().col(k).transpose();
+  }
+  return factor;
+}
 
 std::string direction_text(Eigen::Vector3d direction) {
   Eigen::Index largest = 0;
@@ -229,11 +246,12 @@ JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum
       ceres_problem.SetParameterBlockConstant(twists[i].data());
   for (std::size_t i = 0; i < problem.believed.size() && problem.belief_std > 0; ++i) {
     if (problem.fixed[i] || !ceres_problem.HasParameterBlock(twists[i].data())) continue;
-    auto* const cost = new BeliefCost{problem.believed[i].inverse() * problem.object_from_camera[i],
-                                      problem.centroids[i], problem.radius, problem.belief_std};
+    auto* const cost =
+        new BeliefCost{problem.believed[i].inverse() * problem.object_from_camera[i], problem.centroids[i],
+                       problem.radius, belief_factor(spectrum, i, problem.belief_std)};
     ceres_problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BeliefCost, 6, 6>(cost), nullptr, twists[i].data());
   }
-  JointStep step{problem.object_from_camera, 0, 0};
+  JointStep step{problem.object_from_camera, std::vector<Vector6d>(n, Vector6d::Zero()), 0, 0};
   if (ceres_problem.NumResidualBlocks() > 0) {
     ceres::Solver::Options options;
     options.num_threads = 1;
@@ -252,6 +270,7 @@ JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum
   for (std::size_t i = 0; i < n; ++i) {
     Vector6d const twist = all.segment<6>(static_cast<Eigen::Index>(6 * i));
     if (!twist.allFinite() || problem.fixed[i]) continue;
+    step.twists[i] = twist;
     step.largest = std::max(step.largest, twist.norm());
     step.object_from_camera[i] = problem.object_from_camera[i] * motion(twist, problem.centroids[i], problem.radius);
   }

@@ -26,7 +26,8 @@ struct JointProblem {
   double radius = 1;                       ///< scales rotations
   std::vector<PairMeasurement> pairs;
   /// What the poses were believed to be before any data was seen, and how firmly: one standard deviation of every
-  /// component of a pose's increment, units. Empty and 0: nothing was known. Does not enter the spectrum.
+  /// component of a pose's increment, units. Acts along motions that the pairs hold less firmly than that, and hardly
+  /// along others. Empty and 0: nothing was known. Does not enter the spectrum.
   std::vector<Eigen::Isometry3d> believed;
   double belief_std = 0;
 };
@@ -48,8 +49,9 @@ std::vector<std::string> describe_free_motions(JointProblem const& problem, Join
 enum class PairLoss { quadratic, cauchy };
 struct JointStep {
   std::vector<Eigen::Isometry3d> object_from_camera;
-  double largest = 0;  ///< of all views: length of the increment, rotations times radius
-  double gain = 0;     ///< by how much the cost (in variances) fell: far below 1, no data tells the difference
+  std::vector<Vector6d> twists;  ///< a view's increment, about its centroid
+  double largest = 0;            ///< of all views: length of the increment, rotations times radius
+  double gain = 0;  ///< by how much the cost (in variances) fell: far below 1, no data tells the difference
 };
 /// Minimises the sum of all pairs (Ceres, one thread). Free motions are held: the result differs from the start only
 /// in what the pairs constrain. `cauchy` doubts pairs whose cost exceeds 1 (initial poses from pairwise motions).

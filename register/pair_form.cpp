@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kTukey = 4.685;         // in standard deviations: 95 % efficient for normal noise
 constexpr double kMinToneCosine = 0.35;  // beyond, the texture is smeared
+constexpr double kMaxCorrelation = 0.8;  // beyond, it is misalignment that neighbours share, not noise
 constexpr double kToneGate = 3.0;        // of `cost`, in scales
 
 double tukey_weight(double residual_in_scales) {
@@ -209,7 +210,7 @@ double robust_scale(std::vector<float>& values) {
 }
 
 double effective_share(double correlation) {
-  double const c = std::clamp(correlation, 0.0, 0.95);
+  double const c = std::clamp(correlation, 0.0, kMaxCorrelation);
   return std::pow((1 - c) / (1 + c), 2);
 }
 

@@ -78,9 +78,7 @@ TEST(Align, TheSameViewTwiceCoincides) {
   set.views[1].object_from_camera = set.views[0].object_from_camera;
   scene::set_poses(set, scene::disturbed(scene::poses_of(set), 2, 0.03, 5));
   Context context;
-  RegisterOptions options;
-  options.given_std = 0;  // the poses are wrong, and nothing but the views shall count
-  Alignment const got = align(set, options, context);
+  Alignment const got = align(set, {}, context);
   Eigen::Isometry3d const apart = got.object_from_camera[1].inverse() * got.object_from_camera[0];
   // A pixel is 0.02 wide at this distance.
   EXPECT_LT((apart * Eigen::Vector3d(0, 0, 4) - Eigen::Vector3d(0, 0, 4)).norm(), 0.002);
