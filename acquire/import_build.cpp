@@ -11,6 +11,7 @@
 #include "acquire/segment_outliers.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/srgb.h"
 
 namespace scanview {
 namespace {
@@ -171,7 +172,7 @@ cv::Mat3b shade_by_normal(RangeImage const& image) {
       double const cosine =
           std::isfinite(n[0]) ? std::max(0.0, n[0] * towards.x() + n[1] * towards.y() + n[2] * towards.z()) : 0.5;
       double const linear = 0.05 + 0.75 * cosine;
-      double const srgb = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+      double const srgb = srgb_from_linear(linear);
       gray(y, x) = cv::Vec3b::all(static_cast<std::uint8_t>(std::lround(255 * srgb)));
     }
   return gray;

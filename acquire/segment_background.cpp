@@ -14,14 +14,14 @@
 namespace scanview {
 namespace {
 
-constexpr double kInFront = 3;           // sigmas by which the object stands out
-constexpr double kMostEvidence = 8;      // of one pixel, as a log likelihood ratio: no pixel is certain
-constexpr double kUnsureNearStep = 0.1;  // what a depth is worth next to a step, where matching windows straddle it
-constexpr double kShading = 0.04;        // by which the object's shadow may change the background's brightness
-constexpr double kNoDepth = 1;           // what has none is sooner a shadow of the sensor's beside the object
-constexpr int kStepReach = 8;            // pixels
+constexpr double kInFront = 3;             // sigmas by which the object stands out
+constexpr double kMostEvidence = 8;        // of one pixel, as a log likelihood ratio: no pixel is certain
+constexpr double kUnsureNearStep = 0.1;    // what a depth is worth next to a step, where matching windows straddle it
+constexpr double kShading = 0.04;          // by which the object's shadow may change the background's brightness
+constexpr double kNoDepth = 1;             // what has none is sooner a shadow of the sensor's beside the object
+constexpr int kStepReach = 8;              // pixels
 constexpr double kSmallestSurface = 0.01;  // of the object's largest
-constexpr double kSmoothness = 6;        // price of a mask border across a pair of equal colours
+constexpr double kSmoothness = 6;          // price of a mask border across a pair of equal colours
 
 /// (background - depth) / sigma: positive in front of it. NaN where either is missing.
 cv::Mat1f standing_out(RangeImage const& image, BackgroundModel const& model) {
@@ -258,7 +258,8 @@ std::size_t apply_mask(RangeImage& image, cv::Mat1b const& mask, cv::Mat1f const
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x) {
       auto const label = static_cast<std::size_t>(labels(y, x));
-      if (label > 0 && (in_front[label] * 2 < sizes[label] || sizes[label] < smallest)) image.remove(x, y, PixelClass::outlier);
+      if (label > 0 && (in_front[label] * 2 < sizes[label] || sizes[label] < smallest))
+        image.remove(x, y, PixelClass::outlier);
     }
   remove_outliers(image);
   return before - image.count_depths();

@@ -2,6 +2,7 @@
 #include "base/error.h"
 #include "base/image_file.h"
 #include "cli/stages.h"
+#include "viewer/blend/supersampling.h"
 #include "viewer/select/camera_path.h"
 #include "viewer/view_based/view_based_renderer.h"
 
@@ -26,11 +27,12 @@ StageOutcome render_stage(fs::path const& folder, StageMode mode, Context& conte
     auto const gl = make_offscreen_context();
     auto const renderer = make_view_based_renderer(*gl, set, read_view_meshes(folder, set, context));
     auto const path = orbit_path(set, kOrbitFrames, kFrameWidth, kFrameHeight);
+    SupersamplingRenderer smooth(*renderer, 2);
     std::vector<Frame> frames;
     for (auto const& camera : path) {
       context.check_cancelled();
       context.progress("render", frames.size(), path.size());
-      frames.push_back(renderer->render(camera.camera, camera.object_from_camera));
+      frames.push_back(smooth.render(camera.camera, camera.object_from_camera));
     }
     out.figures["frames"] = frames.size();
     out.figures["back_end"] = "gl";

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/image_file.h"
 #include "cli/stages.h"
+#include "viewer/blend/supersampling.h"
 #include "viewer/select/camera_path.h"
 #include "viewer/view_based/view_based_renderer.h"
 
@@ -21,6 +22,7 @@ struct Arguments {
   int orbit = 0;
   bool halfway = false;
   std::string like, size = "800x600", back_end = "gl";
+  int supersampling = 2;
   ViewBasedOptions options;
 };
 
@@ -48,6 +50,7 @@ void render(Arguments const& arguments, Session& session) {
   auto const gl = make_offscreen_context();
   auto const renderer =
       make_view_based_renderer(*gl, set, read_view_meshes(arguments.set, set, context), arguments.options);
+  SupersamplingRenderer smooth(*renderer, arguments.supersampling);
   std::error_code error;
   fs::create_directories(arguments.output, error);
   if (error) throw Error(ErrorCode::io, arguments.output, "cannot create: " + error.message());
@@ -58,7 +61,7 @@ void render(Arguments const& arguments, Session& session) {
   for (std::size_t i = 0; i < path.size(); ++i) {
     context.check_cancelled();
     auto const start = std::chrono::steady_clock::now();
-    Frame const frame = renderer->render(path[i].camera, path[i].object_from_camera);
+    Frame const frame = smooth.render(path[i].camera, path[i].object_from_camera);
     times.push_back(1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     std::string const file = path[i].name + ".png";
     write_file(arguments.output / file, encode_png(frame.color));
@@ -87,6 +90,8 @@ void add_render(CLI::App& app, Session& session) {
   verb->add_option("--size", arguments->size, "WIDTHxHEIGHT");
   verb->add_option("--back-end", arguments->back_end, "gl (OpenGL 3.3 without a display)")
       ->check(CLI::IsMember({"gl"}));
+  verb->add_option("--supersampling", arguments->supersampling, "Samples a pixel of a border, each way")
+      ->check(CLI::Range(1, 8));
   verb->add_option("--threshold", arguments->options.threshold, "Of soft z, in units (default: from the error budget)");
   verb->add_option("--fill-views", arguments->options.fill_views,
                    "Views beyond the three that fill holes (0: the paper's three)");

@@ -26,12 +26,14 @@ struct ViewMesh {
 
 struct MeshOptions {
   enum class Tolerance { units, sigmas, automatic } tolerance_kind = Tolerance::automatic;
-  double tolerance = 3.0;       ///< greatest distance in depth, in units or in multiples of each pixel's sigma
-  int max_triangles = 0;        ///< a view; 0: as many as the tolerance needs
-  double step_sigmas = 6.0;     ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
-  double max_angle_deg = 80.0;  ///< triangles that are seen more grazingly are dropped
-  int feather_px = 16;          ///< distance from the boundary at which the feather weight is full
-  int min_patch_pixels = 4;     ///< smaller groups of pixels on one surface are not meshed: they count as uncovered
+  double tolerance = 3.0;    ///< greatest distance in depth, in units or in multiples of each pixel's sigma
+  int max_triangles = 0;     ///< a view; 0: as many as the tolerance needs
+  double step_sigmas = 6.0;  ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
+  /// Triangles that are seen more grazingly are dropped. Steps have a test of their own, and the weight cos φ lets a
+  /// grazing triangle count little: dropping it early would leave holes where no other view looks.
+  double max_angle_deg = 87.0;
+  int feather_px = 16;       ///< distance from the boundary at which the feather weight is full
+  int min_patch_pixels = 4;  ///< smaller groups of pixels on one surface are not meshed: they count as uncovered
   void validate() const;
 };
 

@@ -8,18 +8,20 @@
 #include <opencv2/core.hpp>
 
 #include "base/error.h"
+#include "base/srgb.h"
+#include "viewer/blend/supersampling.h"
 #include "viewer/evaluate/image_quality.h"
 
 namespace scanview {
 namespace {
 
 std::uint8_t times_gain(std::uint8_t value, double gain) {
-  double const encoded = value / 255.0;
-  double const linear = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
-  double const x = std::clamp(linear * gain, 0.0, 1.0);
-  return static_cast<std::uint8_t>(
-      std::lround(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055)));
+  double const linear = std::clamp(linear_from_srgb(value / 255.0) * gain, 0.0, 1.0);
+  return static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(linear)));
 }
+
+/// Samples of a border's pixel, each way: as in a photograph, such pixels are mixtures.
+constexpr int kSupersampling = 2;
 
 /// The photograph in the set's common exposure, which is what is rendered.
 cv::Mat3b exposed(View const& view) {
@@ -46,7 +48,11 @@ std::vector<ViewFigures> evaluate(GlContext& gl, ScanSet const& set, std::vector
       excluded.push_back(view);
       renderer->exclude(excluded);
     }
-    result.push_back(compare_with_photograph(*renderer, set, view));
+    SupersamplingRenderer smooth(*renderer, kSupersampling);
+    // The very first frame makes room and compiles.
+    if (result.empty() && set.views[view].object_from_camera)
+      smooth.render(set.views[view].image.camera, *set.views[view].object_from_camera);
+    result.push_back(compare_with_photograph(smooth, set, view));
     context.progress("evaluate", result.size(), views.size());
   }
   return result;
@@ -58,7 +64,6 @@ ViewFigures compare_with_photograph(Renderer& renderer, ScanSet const& set, std:
   View const& view = set.views.at(index);
   Camera const& camera = view.image.camera;
   if (!view.object_from_camera) throw Error(ErrorCode::bad_input, {}, "view " + view.name + " has no pose");
-  renderer.render(camera, *view.object_from_camera);  // the first frame makes room and compiles
   auto const start = std::chrono::steady_clock::now();
   Frame const frame = renderer.render(camera, *view.object_from_camera);
   std::chrono::duration<double, std::milli> const took = std::chrono::steady_clock::now() - start;

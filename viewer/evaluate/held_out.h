@@ -17,7 +17,7 @@ struct ViewFigures {
   double psnr_all = 0;      ///< dB, over all object pixels; what was not drawn counts as black
   double ssim = 0;          ///< over all object pixels, likewise
   double coverage = 0;      ///< share of object pixels that the renderer drew
-  double milliseconds = 0;  ///< of one frame, the second from that camera
+  double milliseconds = 0;  ///< of one frame
   cv::Mat3b photograph;     ///< with the view's gain, black outside the object
   cv::Mat3b rendered;       ///< black where nothing was drawn
   cv::Mat3b difference;     ///< of the two inside the object, four times enlarged
