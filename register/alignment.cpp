@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "register/alignment_figures.h"
+#include "register/feature_start.h"
 #include "register/joint_refinement.h"
 #include "register/pairwise_start.h"
 #include "register/turntable.h"
@@ -39,7 +40,7 @@ class Aligner {
     prepare();
     initial_poses();
     if (options_.refine && set_.views.size() > 1) {
-      start_from_neighbours();
+      if (!joined_by_features_) start_from_neighbours();
       refine();
     } else {
       update_graph(0, 0.1 * radius_);
@@ -63,6 +64,7 @@ class Aligner {
   /// whole, and a tear would never heal.
   std::map<std::pair<std::size_t, std::size_t>, Scales> pair_scales_;
   Alignment result_;
+  bool joined_by_features_ = false;
 
   ViewSurface const& surface(std::size_t view, std::size_t level) const {
     return views_[view].levels[std::min(level, views_[view].levels.size() - 1)];
@@ -101,9 +103,12 @@ class Aligner {
         problem_.belief_std = options_.given_std * radius_;
         break;
       case RegisterOptions::Init::none:
+        if (join_by_features()) break;
         poses.assign(set_.views.size(), Eigen::Isometry3d::Identity());
         break;
       case RegisterOptions::Init::turntable: {
+        // Print that joins all the views needs no belief in equal steps.
+        if (options_.turntable_step_deg == 0 && options_.turntable_axis.isZero() && join_by_features()) break;
         Turntable const table =
             fit_turntable(views_, {options_.turntable_step_deg, options_.turntable_axis, radius_}, context_);
         context_.log(fmt::format("turntable: step {:.3f} deg about ({:.3f}, {:.3f}, {:.3f}), cost {:.3f}",
@@ -112,6 +117,14 @@ class Aligner {
         break;
       }
     }
+  }
+
+  bool join_by_features() {
+    FeatureStart const start = start_from_features(set_, views_, radius_, context_);
+    if (!start.joins(views_)) return false;
+    problem_.object_from_camera = start.object_from_camera;
+    joined_by_features_ = true;
+    return true;
   }
 
   void update_graph(std::size_t level, double gate) {
@@ -222,15 +235,19 @@ class Aligner {
   }
 
   // How much of a step is taken: less where it takes back the one before (each linearisation goes too far where tones
-  // are steeper than their smoothed gradients), so that the two do not take turns.
+  // are steeper than their smoothed gradients), so that the two do not take turns; more where steps creep on in one
+  // direction, as robust weights make them.
   double step_share(JointStep const& last, JointStep const& step, double share) const {
     if (last.twists.empty()) return 1;
-    double product = 0, squares = 0;
+    double product = 0, squares = 0, own = 0;
     for (std::size_t i = 0; i < step.twists.size(); ++i) {
       product += last.twists[i].dot(step.twists[i]);
       squares += last.twists[i].squaredNorm();
+      own += step.twists[i].squaredNorm();
     }
-    return product < -0.25 * squares ? std::max(0.25, share / 2) : std::min(1.0, share * 1.2);
+    if (product < -0.25 * squares) return std::max(0.25, share / 2);
+    bool const creeps = product > 0.8 * std::sqrt(squares * own) && own > 0.25 * squares;
+    return std::min(creeps ? 2.0 : 1.0, share * 1.25);
   }
 
   void take(JointStep const& step, double share) {

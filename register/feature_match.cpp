@@ -148,6 +148,7 @@ FeatureMotion match_features(Features const& a, Features const& b, FeatureMotion
     best = inliers_of(result.b_from_a);
   }
   result.inliers = best.size();
+  for (std::size_t k : best) result.points.push_back(b.points[static_cast<std::size_t>(matches[k].b)]);
   result.found = best.size() >= options.min_inliers;
   return result;
 }

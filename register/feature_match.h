@@ -30,6 +30,7 @@ struct FeatureMotion {
   bool found = false;
   Eigen::Isometry3d b_from_a = Eigen::Isometry3d::Identity();
   std::size_t matches = 0, inliers = 0;
+  std::vector<Eigen::Vector3d> points;  ///< the inliers, in b's camera coordinates
 };
 FeatureMotion match_features(Features const& a, Features const& b, FeatureMotionOptions const& options);
 
