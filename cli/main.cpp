@@ -82,6 +82,8 @@ int run_verb(Session& session, ProgressBar& bar) {
 }
 
 int main(int argc, char** argv) {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
   CLI::App app("Look at real, scanned objects from every side.", "scanview");
   app.set_version_flag("--version", version());
   app.require_subcommand(1);
@@ -105,8 +107,6 @@ int main(int argc, char** argv) {
     return code == 0 ? 0 : static_cast<int>(ErrorCode::usage);
   }
 
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
   cv::setNumThreads(1);  // our own loops are parallel and ordered; OpenCV's would come on top
   ProgressBar bar;
   connect(session, bar);

@@ -10,7 +10,7 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kOrbitFrames = 24;
+constexpr int kOrbitFrames = 12;
 constexpr int kFrameWidth = 480, kFrameHeight = 360;
 
 }  // namespace

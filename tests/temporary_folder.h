@@ -11,9 +11,10 @@ namespace scanview {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    auto const* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = std::string("scanview_") + test->test_suite_name() + "_" + test->name() + "_" +
-                       std::to_string(::getpid()) + "_" + std::to_string(next_++);
+    auto const* test = ::testing::UnitTest::GetInstance()->current_test_info();  // none while a suite is set up
+    std::string name = "scanview_";
+    name.append(test ? test->test_suite_name() : "suite").append("_").append(test ? test->name() : "set_up");
+    name.append("_").append(std::to_string(::getpid())).append("_").append(std::to_string(next_++));
     for (char& c : name)
       if (c == '/') c = '_';
     path_ = std::filesystem::temp_directory_path() / name;

@@ -18,8 +18,8 @@ class Resume : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder;
-    CommandResult const synth = run_scanview({"synth", "statuette", "-o", scan().string(), "--views", "5", "--size",
-                                              "120x90", "--noise", "0.002", "--disturb", "1:0.5"});
+    CommandResult const synth = run_scanview({"synth", "statuette", "-o", scan().string(), "--views", "8", "--layout",
+                                              "circle", "--size", "120x90", "--noise", "0.002", "--disturb", "1:0.5"});
     ASSERT_EQ(synth.exit_code, 0) << synth.errors;
     ASSERT_EQ(run(reference()).exit_code, 0);
   }
@@ -64,8 +64,9 @@ TEST_F(Resume, KilledRunsFinishInEqualBytes) {
 
 TEST_F(Resume, ControlCExitsWith130AndResumes) {
   fs::path const set = folder_->path() / "interrupted" / "set";
-  CommandResult const result = run(set, {}, [](int child) {
-    ::usleep(150'000);
+  CommandResult const result = run(set, {}, [&](int child) {
+    // Once there is something half-made.
+    for (int i = 0; i < 2000 && !fs::exists(set.string() + ".partial"); ++i) ::usleep(5'000);
     ::kill(child, SIGINT);
   });
   EXPECT_EQ(result.exit_code, 130);

@@ -108,14 +108,15 @@ TEST(HeldOut, TheOnlyViewCannotBeHeldOut) {
 }
 
 TEST(HeldOut, APhotographIsComparedInTheSetsExposure) {
-  // A gain brightens what is rendered and the photograph alike.
+  // A gain brightens what is rendered and the photograph alike: taken for one of the two only, 40 % more light would
+  // leave less than 20 dB. What remains is the rim, a fifteenth of these few pixels, whose samples are averaged.
   auto scene = scan(sphere(Vector3d::Zero(), 1), Camera::perspective(80, 60, 75, 75, 40, 30), ring(4, 15), 0.3, 0.02);
   scene.set.views[1].gain = {1.4, 1.2, 0.8};
   auto const gl = make_offscreen_context();
   Context context;
   ViewBasedOptions options;
   options.fill_views = 0;  // which would add other exposures at the rim
-  EXPECT_GT(evaluate_source_views(*gl, scene.set, scene.meshes, {1}, options, context)[0].psnr_common, 45);
+  EXPECT_GT(evaluate_source_views(*gl, scene.set, scene.meshes, {1}, options, context)[0].psnr_common, 35);
 }
 
 TEST(Exposure, FindsTheGainsThatWereTaken) {
