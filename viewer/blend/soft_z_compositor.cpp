@@ -58,7 +58,9 @@ void main() {
   int kept = 0;
   for (int k = 0; k < count; ++k) {
     int i = layer[k];
-    float weight = (layer_weight[i] + need * layer_fill[i]) * quality[k];
+    // What only fills must be fairly good itself: the last fringe of a mesh, seen grazingly, hangs from the true outline.
+    float fair = clamp(quality[k] / 0.03 - 1.0, 0.0, 1.0);
+    float weight = (layer_weight[i] + need * fair * layer_fill[i]) * quality[k];
     if (weight > 0.0) {
       w[kept] = weight;
       z[kept] = texelFetch(depth_layers, ivec3(pixel, i), 0).r;
