@@ -147,7 +147,7 @@ class Aligner {
   void start_from_neighbours() {
     for (int round = 0; round < 2; ++round) {
       update_graph(std::min<std::size_t>(1, coarsest_), (round == 0 ? 0.25 : 0.1) * radius_);
-      std::vector<ViewGraphEdge> edges = graph_.edges;
+      std::vector<ViewGraphEdge> edges = strongest_edges(views_.size(), graph_.edges, 4);
       // Views taken one after the other are neighbours even where rough poses tear them apart.
       for (std::size_t i = 0; i + 1 < views_.size(); ++i) {
         bool const there =
@@ -171,11 +171,18 @@ class Aligner {
     match.gate = gate;
     match.radius = radius_;
     match.min_normal_cos = level > 0 ? 0.6 : 0.7;
-    match.max_samples = level > 0 ? 3000 : 6000;
+    // Many pairs that say the same need not say it with all their samples.
+    std::size_t const pairs = std::max<std::size_t>(1, graph_.edges.size());
+    match.max_samples =
+        std::clamp<std::size_t>(level > 0 ? 240000 / pairs : 480000 / pairs, 1500, level > 0 ? 3000 : 6000);
     if (scales_.geometry > 0) match.geometry_scale = scales_.geometry;
     if (scales_.tone > 0) match.tone_scale = scales_.tone;
     match.geometry_share = effective_share(scales_.geometry_correlation);
-    match.tone_share = effective_share(scales_.tone_correlation);
+    // A shift between colour and depth, or a warp of the depth, moves tones over wide areas as well; but their
+    // residuals change sign with the print and hardly show it: so their share is the geometric mean with the shape's at
+    // most.
+    double const tone_share = effective_share(scales_.tone_correlation);
+    match.tone_share = std::min(tone_share, std::sqrt(tone_share * match.geometry_share));
     std::vector<PairForm> forms(graph_.edges.size());
     for_each_index(context_, forms.size(), [&](std::size_t e) {
       ViewGraphEdge const& edge = graph_.edges[e];

@@ -7,19 +7,34 @@
 
 namespace scanview {
 
-std::vector<std::vector<std::size_t>> connected_parts(std::size_t count, std::vector<ViewGraphEdge> const& edges) {
-  std::vector<std::size_t> root(count);
-  std::iota(root.begin(), root.end(), std::size_t{0});
-  auto const find = [&](std::size_t i) {
-    while (root[i] != i) i = root[i];
+namespace {
+
+// Disjoint sets of views, each known by its smallest.
+class Parts {
+ public:
+  explicit Parts(std::size_t count) : root_(count) { std::iota(root_.begin(), root_.end(), std::size_t{0}); }
+  std::size_t find(std::size_t i) const {
+    while (root_[i] != i) i = root_[i];
     return i;
-  };
-  for (ViewGraphEdge const& edge : edges) {
-    std::size_t const a = find(edge.a), b = find(edge.b);
-    root[std::max(a, b)] = std::min(a, b);
   }
+  /// False where they were one already.
+  bool join(std::size_t i, std::size_t j) {
+    std::size_t const a = find(i), b = find(j);
+    root_[std::max(a, b)] = std::min(a, b);
+    return a != b;
+  }
+
+ private:
+  std::vector<std::size_t> root_;
+};
+
+}  // namespace
+
+std::vector<std::vector<std::size_t>> connected_parts(std::size_t count, std::vector<ViewGraphEdge> const& edges) {
+  Parts sets(count);
+  for (ViewGraphEdge const& edge : edges) sets.join(edge.a, edge.b);
   std::vector<std::vector<std::size_t>> members(count), parts;
-  for (std::size_t i = 0; i < count; ++i) members[find(i)].push_back(i);
+  for (std::size_t i = 0; i < count; ++i) members[sets.find(i)].push_back(i);
   for (auto& part : members)
     if (!part.empty()) parts.push_back(std::move(part));
   std::stable_sort(parts.begin(), parts.end(), [](auto const& l, auto const& r) { return l.size() > r.size(); });
@@ -43,6 +58,26 @@ ViewGraph build_view_graph(std::vector<ViewSurface const*> const& surfaces,
   for (auto const& row : rows) graph.edges.insert(graph.edges.end(), row.begin(), row.end());
   graph.parts = connected_parts(n, graph.edges);
   return graph;
+}
+
+std::vector<ViewGraphEdge> strongest_edges(std::size_t views, std::vector<ViewGraphEdge> const& edges,
+                                           std::size_t count) {
+  std::vector<ViewGraphEdge> sorted = edges, kept;
+  std::stable_sort(sorted.begin(), sorted.end(), [](ViewGraphEdge const& l, ViewGraphEdge const& r) {
+    return l.overlap_ab + l.overlap_ba > r.overlap_ab + r.overlap_ba;
+  });
+  Parts tree(views);
+  std::vector<std::size_t> used(views, 0);
+  for (ViewGraphEdge const& edge : sorted) {
+    bool const joins = tree.join(edge.a, edge.b);
+    if (!joins && used[edge.a] >= count && used[edge.b] >= count) continue;
+    ++used[edge.a];
+    ++used[edge.b];
+    kept.push_back(edge);
+  }
+  std::sort(kept.begin(), kept.end(),
+            [](ViewGraphEdge const& l, ViewGraphEdge const& r) { return std::pair(l.a, l.b) < std::pair(r.a, r.b); });
+  return kept;
 }
 
 }  // namespace scanview

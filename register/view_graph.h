@@ -28,5 +28,10 @@ ViewGraph build_view_graph(std::vector<ViewSurface const*> const& surfaces,
 
 /// Connected parts of `count` views under these edges, largest first, then by their first view.
 std::vector<std::vector<std::size_t>> connected_parts(std::size_t count, std::vector<ViewGraphEdge> const& edges);
+/// For every view its `count` edges of largest overlap, and those that a spanning tree of all needs besides (Kruskal,
+/// largest first): as connected as all of them, at a cost that grows with the views, not with their square. Ordered by
+/// (a, b).
+std::vector<ViewGraphEdge> strongest_edges(std::size_t views, std::vector<ViewGraphEdge> const& edges,
+                                           std::size_t count);
 
 }  // namespace scanview

@@ -113,6 +113,15 @@ TEST(ViewGraph, PartsAreOrderedBySizeThenByFirstView) {
   EXPECT_EQ(parts, (std::vector<std::vector<std::size_t>>{{1, 2, 3}, {4, 5}, {0}}));
 }
 
+TEST(ViewGraph, StrongestEdgesStayConnected) {
+  // Two groups of three, joined by one weak edge.
+  std::vector<ViewGraphEdge> const edges{{0, 1, 0.9, 0.9}, {0, 2, 0.8, 0.8}, {1, 2, 0.2, 0.2}, {2, 3, 0.1, 0.1},
+                                         {3, 4, 0.9, 0.9}, {3, 5, 0.8, 0.8}, {4, 5, 0.7, 0.7}};
+  std::vector<ViewGraphEdge> const kept = strongest_edges(6, edges, 1);
+  EXPECT_EQ(connected_parts(6, kept).size(), 1u);
+  EXPECT_EQ(kept.size(), 5u);  // 1-2 and 4-5 say nothing new
+}
+
 TEST(FeatureMatch, FindsTheMotionOfAPrintedBox) {
   ScanSet const set = scene::ring(scene::printed_box(), 12, -1.0, Noise{0.003, 2, 0, 4});
   auto const features = [&](std::size_t i) {
