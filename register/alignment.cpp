@@ -280,7 +280,7 @@ class Aligner {
     result_.status = AlignmentStatus::not_converged;
     for (std::size_t level = coarsest_ + 1; level-- > 0;) {
       double const pixel = median_pixel(level);
-      int const rounds = level > 0 ? std::max(2, options_.max_iterations / 5) : options_.max_iterations;
+      int const rounds = level > 0 ? std::max(2, options_.max_iterations / 8) : options_.max_iterations;
       scales_ = {};
       pair_scales_.clear();
       JointStep last;

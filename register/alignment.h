@@ -16,7 +16,7 @@ struct RegisterOptions {
   Eigen::Vector3d turntable_axis{0, 0, 0};
   bool refine = true;
   int levels = 4;            ///< of the pyramid, coarse to fine
-  int max_iterations = 30;   ///< joint refinements with fresh correspondences
+  int max_iterations = 50;   ///< joint refinements with fresh correspondences
   double min_overlap = 0.1;  ///< share of a view's depths that another view sees: pairs below are not used
   /// `given`: one standard deviation of the given poses, as a share of a view's radius (a rotation moves a point at
   /// this radius). Where the data says more, this changes nothing; where surfaces nearly slide it keeps a pose near
