@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <numeric>
 
 #include "acquire/scan_set_file.h"
 #include "base/error.h"
@@ -78,12 +77,10 @@ StageOutcome evaluate_stage(fs::path const& folder, EvaluateRequest const& reque
     ScanSet const set = read_scan_set(folder, context);
     auto const meshes = read_view_meshes(folder, set, context);
     auto const gl = make_offscreen_context();
-    std::vector<std::size_t> all(set.views.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
     // A set of one view has nothing left to render it from.
     auto const held =
         set.views.size() > 1 ? evaluate_held_out(*gl, set, meshes, held_out, {}, context) : std::vector<ViewFigures>();
-    auto const source = evaluate_source_views(*gl, set, meshes, all, {}, context);
+    auto const source = evaluate_source_views(*gl, set, meshes, held_out, {}, context);
     out.figures["renderers"] = {{"view_based", mean_figures(held)}, {"source_views", mean_figures(source)}};
     out.figures["views"] = Json::array();
     for (auto const& f : held) out.figures["views"].push_back(to_json(f));

@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kOrbitFrames = 12;
-constexpr int kFrameWidth = 480, kFrameHeight = 360;
+constexpr int kFrameWidth = 320, kFrameHeight = 240;
 
 }  // namespace
 

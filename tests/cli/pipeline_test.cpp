@@ -29,7 +29,7 @@ class Pipeline : public ::testing::Test {
 TEST_F(Pipeline, ASyntheticScanComesBack) {
   run({"synth", "statuette", "-o", in("scan"), "--views", "24", "--noise", "0.001", "--color-noise", "1", "--disturb",
        "3:2"});
-  Json const all = run({"run", in("scan"), "-o", in("set")});
+  Json const all = run({"run", in("scan"), "-o", in("set"), "--hold-out", "every:2"});
   for (char const* verb : {"import", "register", "mesh", "render", "evaluate"})
     EXPECT_TRUE(all["stages"].contains(verb)) << verb;
 
