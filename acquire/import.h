@@ -1,11 +1,10 @@
 #pragma once
+#include <Eigen/Core>
 #include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "acquire/scan_set.h"
 #include "base/context.h"
@@ -32,20 +31,22 @@ struct ImportOptions {
 struct ImportResult {
   ScanSet set;
   std::size_t depths = 0;
-  std::size_t background_removed = 0;               ///< pixels that had a depth
-  std::vector<std::string> failed_views;            ///< named; the rest is there (exit 6)
-  std::vector<std::filesystem::path> files_read;    ///< everything that decided the result, for hashes
+  std::size_t background_removed = 0;             ///< pixels that had a depth
+  std::vector<std::string> failed_views;          ///< named; the rest is there (exit 6)
+  std::vector<std::filesystem::path> files_read;  ///< everything that decided the result, for hashes
 };
 
 /// Colour + 16-bit depth + intrinsics: a folder with rgbd.json (DESIGN §3), or a known layout: 7-Scenes
-/// (frame-NNNNNN.color/.depth/.pose), TUM (rgb.txt, depth.txt, groundtruth.txt), Redwood/Open3D (color|image|rgb, depth, camera_intrinsic.json,
-/// trajectory .log). Lens distortion is removed; a depth camera of its own is reprojected with a z-buffer.
+/// (frame-NNNNNN.color/.depth/.pose), TUM (rgb.txt, depth.txt, groundtruth.txt), Redwood/Open3D (color|image|rgb,
+/// depth, camera_intrinsic.json, trajectory .log). Lens distortion is removed; a depth camera of its own is reprojected
+/// with a z-buffer.
 ImportResult import_rgbd(std::filesystem::path const& path, ImportOptions const& options, Context& context);
 /// Stanford range_grid PLY scans + .conf: folder, .conf or archive (.tar.gz, .tar.xz, .zip).
 ImportResult import_stanford(std::filesystem::path const& path, ImportOptions const& options, Context& context);
 /// nerfstudio / instant-ngp transforms.json with depth_file_path.
 ImportResult import_nerfstudio(std::filesystem::path const& path, ImportOptions const& options, Context& context);
-/// COLMAP text model (cameras.txt, images.txt) with depth maps (stereo/depth_maps/NAME.geometric.bin or .photometric.bin).
+/// COLMAP text model (cameras.txt, images.txt) with depth maps (stereo/depth_maps/NAME.geometric.bin or
+/// .photometric.bin).
 ImportResult import_colmap(std::filesystem::path const& path, ImportOptions const& options, Context& context);
 
 /// "rgbd", "stanford", "nerfstudio", "colmap": what `path` looks like; empty where it is none of these.

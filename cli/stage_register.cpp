@@ -19,7 +19,8 @@ Json to_json(RegisterOptions const& options) {
           {"refine", options.refine},
           {"levels", options.levels},
           {"max_iterations", options.max_iterations},
-          {"min_overlap", options.min_overlap}};
+          {"min_overlap", options.min_overlap},
+          {"given_std", options.given_std}};
 }
 
 Json poses_json(ScanSet const& set) {
@@ -88,8 +89,10 @@ RegisterOptions resolve(RegisterRequest const& request, ScanSet& set, Context& c
     read_poses(request.pose_file, set);
     options.init = RegisterOptions::Init::given;
   } else if (request.start == RegisterRequest::Start::automatic && !set.has_poses()) {
-    context.warn("the views have no poses: a turntable is assumed (equal steps, full turn); say --init to change that");
-    options.init = RegisterOptions::Init::turntable;
+    context.warn(
+        "the views have no poses: an object that turned in front of a camera is assumed; say --init to change that");
+    say-- init to change that ");
+        options.init = RegisterOptions::Init::turntable;
   }
   return options;
 }

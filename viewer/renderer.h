@@ -1,7 +1,6 @@
 #pragma once
-#include <opencv2/core/mat.hpp>
-
 #include <Eigen/Geometry>
+#include <opencv2/core/mat.hpp>
 
 #include "calib/camera.h"
 
