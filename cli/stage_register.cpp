@@ -91,8 +91,7 @@ RegisterOptions resolve(RegisterRequest const& request, ScanSet& set, Context& c
   } else if (request.start == RegisterRequest::Start::automatic && !set.has_poses()) {
     context.warn(
         "the views have no poses: an object that turned in front of a camera is assumed; say --init to change that");
-    say-- init to change that ");
-        options.init = RegisterOptions::Init::turntable;
+    options.init = RegisterOptions::Init::turntable;
   }
   return options;
 }
