@@ -59,4 +59,14 @@ std::vector<std::pair<std::string, std::string>> folder_hashes(fs::path const& f
   return hashes;
 }
 
+Json VerbTest::run(std::vector<std::string> arguments) {
+  fs::path const report = folder_.path() / "report.json";
+  std::string const verb = arguments.front();
+  for (std::string const& more : {std::string("--quiet"), std::string("--report"), report.string()})
+    arguments.push_back(more);
+  CommandResult const result = run_scanview(arguments);
+  EXPECT_EQ(result.exit_code, 0) << verb << ": " << result.errors;
+  return result.exit_code == 0 ? read_json(report) : Json::object();
+}
+
 }  // namespace scanview

@@ -1,8 +1,13 @@
 #pragma once
+#include <gtest/gtest.h>
+
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
+
+#include "base/files.h"
+#include "tests/temporary_folder.h"
 
 namespace scanview {
 
@@ -21,5 +26,17 @@ CommandResult run_scanview(std::vector<std::string> const& arguments, std::funct
 /// Relative path -> content hash of every file below a folder, but for report.html and timings.json: what two equal
 /// runs must share.
 std::vector<std::pair<std::string, std::string>> folder_hashes(std::filesystem::path const& folder);
+
+/// Tests that run verbs which must succeed, in a folder of their own.
+class VerbTest : public ::testing::Test {
+ protected:
+  /// The verb's report; the test fails where the verb does.
+  Json run(std::vector<std::string> arguments);
+  /// A path in the test's folder.
+  std::string in(std::string const& name) const { return (folder_.path() / name).string(); }
+
+ private:
+  TemporaryFolder folder_;
+};
 
 }  // namespace scanview

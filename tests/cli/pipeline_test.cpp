@@ -12,19 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class Pipeline : public ::testing::Test {
- protected:
-  /// Runs a verb that must succeed and returns its report.
-  Json run(std::vector<std::string> arguments) {
-    fs::path const report = folder_.path() / "report.json";
-    arguments.insert(arguments.end(), {"--quiet", "--report", report.string()});
-    CommandResult const result = run_scanview(arguments);
-    EXPECT_EQ(result.exit_code, 0) << arguments[0] << ": " << result.errors;
-    return result.exit_code == 0 ? read_json(report) : Json::object();
-  }
-  std::string in(std::string const& name) const { return (folder_.path() / name).string(); }
-  TemporaryFolder folder_;
-};
+class Pipeline : public VerbTest {};
 
 TEST_F(Pipeline, ASyntheticScanComesBack) {
   run({"synth", "statuette", "-o", in("scan"), "--views", "24", "--noise", "0.001", "--color-noise", "1", "--disturb",

@@ -10,20 +10,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class RealData : public ::testing::Test {
+class RealData : public VerbTest {
  protected:
   static fs::path data(std::string const& name) {
     return fs::path(SCANVIEW_SOURCE_DIR).parent_path() / "shared/data" / name;
   }
-  Json run(std::vector<std::string> arguments) {
-    fs::path const report = folder_.path() / "report.json";
-    arguments.insert(arguments.end(), {"--quiet", "--report", report.string()});
-    CommandResult const result = run_scanview(arguments);
-    EXPECT_EQ(result.exit_code, 0) << arguments[0] << ": " << result.errors;
-    return result.exit_code == 0 ? read_json(report) : Json::object();
-  }
-  std::string in(std::string const& name) const { return (folder_.path() / name).string(); }
-  TemporaryFolder folder_;
 };
 
 /// Median over the pairs of their median distance between overlapping surfaces.
