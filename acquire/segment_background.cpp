@@ -261,6 +261,7 @@ std::size_t apply_mask(RangeImage& image, cv::Mat1b const& mask, cv::Mat1f const
       if (label > 0 && (in_front[label] * 2 < sizes[label] || sizes[label] < smallest))
         image.remove(x, y, PixelClass::outlier);
     }
+  remove_hanging_scraps(image, kSmallestSurface);
   remove_outliers(image);
   return before - image.count_depths();
 }

@@ -1,7 +1,9 @@
 #include "acquire/segment_outliers.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "acquire/depth_noise.h"
@@ -73,6 +75,35 @@ std::size_t remove_outliers(RangeImage& image, int smallest_piece) {
   for (int y = 0; y < labels.rows; ++y)
     for (int x = 0; x < labels.cols; ++x)
       if (labels(y, x) > 0 && sizes[static_cast<std::size_t>(labels(y, x))] < smallest_piece) {
+        image.remove(x, y, PixelClass::outlier);
+        ++removed;
+      }
+  return removed;
+}
+
+std::size_t remove_hanging_scraps(RangeImage& image, double smallest_share) {
+  constexpr int kNeck = 5;
+  cv::Mat1b const object = image.classes == static_cast<std::uint8_t>(PixelClass::object);
+  cv::Mat1b inner;
+  cv::erode(object, inner, cv::Mat1b::ones(kNeck, kNeck), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::Mat1i labels;
+  cv::Mat stats, centers;
+  int const count = cv::connectedComponentsWithStats(inner, labels, stats, centers, 8, CV_32S);
+  int largest = 0;
+  for (int label = 1; label < count; ++label) largest = std::max(largest, stats.at<int>(label, cv::CC_STAT_AREA));
+  cv::Mat1b small = cv::Mat1b::zeros(object.size()), large = small.clone();
+  for (int y = 0; y < object.rows; ++y)
+    for (int x = 0; x < object.cols; ++x) {
+      if (labels(y, x) == 0) continue;
+      bool const is_small = stats.at<int>(labels(y, x), cv::CC_STAT_AREA) < smallest_share * largest;
+      (is_small ? small : large)(y, x) = 255;
+    }
+  std::size_t removed = 0;
+  cv::dilate(small, small, cv::Mat1b::ones(kNeck + 2, kNeck + 2));
+  cv::dilate(large, large, cv::Mat1b::ones(kNeck, kNeck));
+  for (int y = 0; y < object.rows; ++y)
+    for (int x = 0; x < object.cols; ++x)
+      if (object(y, x) != 0 && small(y, x) != 0 && large(y, x) == 0) {
         image.remove(x, y, PixelClass::outlier);
         ++removed;
       }

@@ -15,4 +15,9 @@ std::size_t remove_outliers(RangeImage& image, int smallest_piece = 25);
 /// pixel, 0 elsewhere; `sizes[label]` is the number of pixels.
 cv::Mat1i surface_pieces(RangeImage const& image, std::vector<int>& sizes);
 
+/// Removes scraps of the background that touch the object in the picture: pieces below `smallest_share` of its size
+/// that hang on it by a neck of at most four pixels. Thin parts of an object have no such bulge, and stay. Returns how
+/// many depths went.
+std::size_t remove_hanging_scraps(RangeImage& image, double smallest_share);
+
 }  // namespace scanview

@@ -36,6 +36,37 @@ RangeImage make_image(Camera const& camera, Depth const& z, DepthNoise const& no
 
 DepthNoise metre_noise() { return sensor_noise(Unit::m, 0.0001, 1); }
 
+TEST(Outliers, ScrapsThatHangByAThreadGoAndThinPartsStay) {
+  RangeImage image = empty_range_image(Camera::perspective(200, 160, 200, 200, 100, 80));
+  auto const add = [&](auto const& inside) {
+    for (int y = 0; y < 160; ++y)
+      for (int x = 0; x < 200; ++x)
+        if (inside(x, y)) {
+          image.depth(y, x) = 1.0F;
+          image.sigma(y, x) = 0.001F;
+          image.classes(y, x) = static_cast<std::uint8_t>(PixelClass::object);
+        }
+  };
+  auto const disc = [](double u, double v, double r) {
+    return [=](int x, int y) { return std::hypot(x - u, y - v) <= r; };
+  };
+  auto const bar = [](int x0, int y0, int x1, int y1) {
+    return [=](int x, int y) { return x >= x0 && x < x1 && y >= y0 && y < y1; };
+  };
+  add(disc(80, 80, 60));       // the object, 11 300 pixels
+  add(bar(139, 60, 185, 64));  // a thin part of it
+  add(disc(80, 16, 8));        // a bump that sits broadly on it
+  std::size_t const whole = image.count_depths();
+  EXPECT_EQ(remove_hanging_scraps(image, 0.01), 0U);
+  add(bar(139, 95, 155, 98));  // a thread ...
+  add(disc(158, 96, 5));       // ... and a scrap of 80 pixels
+  remove_hanging_scraps(image, 0.01);
+  EXPECT_FALSE(image.has_depth(158, 96));
+  EXPECT_TRUE(image.has_depth(180, 62));
+  EXPECT_TRUE(image.has_depth(80, 10));
+  EXPECT_LT(image.count_depths(), whole + 16 * 3);
+}
+
 TEST(DepthNoise, FollowsTheTriangulationFormula) {
   // 0.1 mm and 2e-3 per metre: 2.1 mm at 1 m; in millimetres the same.
   EXPECT_NEAR(sensor_noise(Unit::m, 0, 1).sigma(1), 0.0021, 1e-9);
