@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 
 get_property(scanview_libraries GLOBAL PROPERTY SCANVIEW_LIBRARIES)
 install(TARGETS ${scanview_libraries} EXPORT scanview_targets)
-install(EXPORT scanview_targets NAMESPACE scanview:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/scanview)
+install(EXPORT scanview_targets FILE scanview-targets.cmake NAMESPACE scanview:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/scanview)
 foreach(folder base calib acquire register mesh synth viewer)
   install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/scanview FILES_MATCHING PATTERN "*.h")
 endforeach()
