@@ -133,10 +133,9 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
     set.error_budget.registration = alignment.error;
     set.error_budget.approximation = {};  // the meshes' turn comes after this
 
-    if (request.exposure != 0) {
-      auto const gains = estimate_gains(set, {}, context);
-      for (std::size_t i = 0; i < set.views.size(); ++i) set.views[i].gain = gains[i];
-    }
+    auto const gains = request.exposure != 0 ? estimate_gains(set, {}, context)
+                                             : std::vector<Eigen::Vector3d>(set.views.size(), Eigen::Vector3d::Ones());
+    for (std::size_t i = 0; i < set.views.size(); ++i) set.views[i].gain = gains[i];
     write_json(folder / "poses.json", {{"initial", initial}, {"registered", poses_json(set)}});
     write_manifest(folder, set);
     out.figures = figures_of(set, alignment);

@@ -38,7 +38,7 @@ struct RegisterRequest {
   enum class Start { automatic, options, file } start = Start::automatic;  ///< automatic: given poses, else a turntable
   std::filesystem::path pose_file;                                         ///< Start::file
   RegisterOptions options;
-  int exposure = 1;  ///< 1: also bring the views to one exposure (View::gain); 0: leave the gains as they are
+  int exposure = 1;  ///< 1: also bring the views to one exposure (View::gain); 0: all gains 1
 };
 struct EvaluateRequest {
   std::string hold_out = "one";  ///< one (each in turn), every:N, or names with commas
