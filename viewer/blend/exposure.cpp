@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/srgb.h"
 
 namespace scanview {
 namespace {
@@ -13,15 +14,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kStride = 4;  ///< pixels apart, in x and y
-
-std::array<double, 256> linear_light() {
-  std::array<double, 256> table{};
-  for (int i = 0; i < 256; ++i) {
-    double const x = i / 255.0;
-    table[static_cast<std::size_t>(i)] = x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
-  }
-  return table;
-}
 
 /// Neither black, whose noise is all there is, nor saturated.
 bool usable(cv::Vec3b const& color) {
@@ -79,7 +71,7 @@ std::vector<Vector3d> estimate_gains(ScanSet const& set, ExposureOptions const& 
 
   std::size_t const n = set.views.size();
   std::vector<Shared> shared(n * n);
-  auto const linear = linear_light();
+  auto const& linear = linear_from_srgb8();
   for_each_index(
       context, n * n,
       [&](std::size_t i) {

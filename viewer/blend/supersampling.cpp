@@ -1,6 +1,6 @@
 #include "viewer/blend/supersampling.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,13 +9,6 @@
 
 namespace scanview {
 namespace {
-
-std::array<float, 256> linear_table() {
-  std::array<float, 256> table{};
-  for (std::size_t i = 0; i < table.size(); ++i)
-    table[i] = static_cast<float>(linear_from_srgb(static_cast<double>(i) / 255));
-  return table;
-}
 
 std::uint8_t encode(double linear) { return static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(linear))); }
 
@@ -44,7 +37,7 @@ bool has_border(Frame const& samples, Camera const& camera, int x, int y, int fa
 
 Frame box_filtered(Frame const& frame, int factor) {
   if (factor == 1) return frame;
-  static std::array<float, 256> const linear = linear_table();
+  auto const& linear = linear_from_srgb8();
   float const missing = std::numeric_limits<float>::quiet_NaN();
   int const width = frame.color.cols / factor, height = frame.color.rows / factor;
   Frame small{cv::Mat4b(height, width), cv::Mat1f(height, width)};
