@@ -1,5 +1,6 @@
 #include "calib/lens.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -26,20 +27,52 @@ cv::Mat2f distortion_map(Camera const& camera, Lens const& lens) {
 
 Eigen::Vector2d Lens::distort(Eigen::Vector2d const& p) const {
   double const r2 = p.squaredNorm(), x = p.x(), y = p.y();
-  double const radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  double const radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)));
   return {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
 }
 
-Lens Lens::from_json(Json const& json, std::filesystem::path const& path) {
-  if (!json.is_array() || json.size() < 4 || json.size() > 5)
-    throw Error(ErrorCode::bad_input, path, "'distortion' is not [k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
-  double values[5] = {};
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    if (!json[i].is_number() || !std::isfinite(json[i].get<double>()))
-      throw Error(ErrorCode::bad_input, path, "'distortion' has an entry that is no number");
-    values[i] = json[i].get<double>();
+Eigen::Vector2d Lens::undistort(Eigen::Vector2d const& distorted) const {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (is_ideal()) return distorted;
+  Eigen::Vector2d p = distorted;
+  for (int step = 0; step < 30; ++step) {
+    double const r2 = p.squaredNorm(), x = p.x(), y = p.y();
+    double const above = 1 + r2 * (k1 + r2 * (k2 + r2 * k3)), below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6));
+    double const radial = above / below;
+    // d radial / d r², for the chain rule below.
+    double const slope = (k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))) / below;
+    double const xx = radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x;
+    double const xy = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y;
+    double const yy = radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x;
+    double const determinant = xx * yy - xy * xy;
+    if (!(determinant > 0) || !(xx > 0)) return {kNone, kNone};  // beyond the fold
+    Eigen::Vector2d const error = distort(p) - distorted;
+    p -= Eigen::Vector2d(yy * error.x() - xy * error.y(), xx * error.y() - xy * error.x()) / determinant;
+    if (error.squaredNorm() < 1e-28) return p;
   }
-  return {values[0], values[1], values[2], values[3], values[4]};
+  if ((distort(p) - distorted).norm() < 1e-9) return p;
+  return {kNone, kNone};
+}
+
+Lens Lens::from_values(std::vector<double> const& values, std::filesystem::path const& path) {
+  if (values.size() != 4 && values.size() != 5 && values.size() != 8)
+    throw Error(ErrorCode::bad_input, path,
+                "'distortion' is not [k1, k2, p1, p2], [k1, k2, p1, p2, k3] or [k1, k2, p1, p2, k3, k4, k5, k6]");
+  std::array<double, 8> all = {};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i]))
+      throw Error(ErrorCode::bad_input, path, "'distortion' has an entry that is no number");
+    all[i] = values[i];
+  }
+  return {all[0], all[1], all[2], all[3], all[4], all[5], all[6], all[7]};
+}
+
+Lens Lens::from_json(Json const& json, std::filesystem::path const& path) {
+  if (!json.is_array()) throw Error(ErrorCode::bad_input, path, "'distortion' is no list of numbers");
+  std::vector<double> values;
+  for (auto const& entry : json)
+    values.push_back(entry.is_number() ? entry.get<double>() : std::numeric_limits<double>::quiet_NaN());
+  return from_values(values, path);
 }
 
 cv::Mat undistort_color(cv::Mat const& picture, Camera const& camera, Lens const& lens) {

@@ -9,7 +9,7 @@
 namespace scanview {
 namespace {
 
-Lens const kLens{-0.2, 0.05, 0.001, -0.002, 0.01};
+Lens const kLens{-0.2, 0.05, 0.001, -0.002, 0.01, 0, 0, 0};
 Camera const kCamera = Camera::perspective(320, 240, 300, 300, 159.5, 119.5);
 
 TEST(Lens, DistortionByHand) {
@@ -20,6 +20,21 @@ TEST(Lens, DistortionByHand) {
   EXPECT_TRUE(kLens.distort({0.2, 0.1}).isApprox(Eigen::Vector2d(x, y), 1e-14));
 }
 
+TEST(Lens, UndistortIsTheInverse) {
+  Lens const rational{-0.3, 0.2, 0.001, -0.002, 0.05, 0.1, -0.05, 0.02};
+  for (Lens const& lens : {kLens, rational})
+    for (double x = -0.6; x <= 0.6; x += 0.1)
+      for (double y = -0.45; y <= 0.45; y += 0.09)
+        EXPECT_LT((lens.undistort(lens.distort({x, y})) - Eigen::Vector2d(x, y)).norm(), 1e-12) << x << " " << y;
+}
+
+TEST(Lens, BeyondTheFoldThereIsNoInverse) {
+  // r (1 - r²) is largest, 0.385, at r = 0.577: nothing is imaged farther out.
+  Lens const barrel{-1, 0, 0, 0, 0, 0, 0, 0};
+  EXPECT_TRUE(barrel.undistort({0.5, 0}).hasNaN());
+  EXPECT_NEAR(barrel.undistort({0.375, 0}).x(), 0.5, 1e-12);
+}
+
 TEST(Lens, UndistortedPictureIsTheIdealOne) {
   // A smooth function of the ideal ray, photographed through the lens, comes back as that function.
   auto const value = [](Eigen::Vector2d const& p) { return 128 + 60 * std::sin(8 * p.x()) + 50 * std::cos(9 * p.y()); };
@@ -27,8 +42,7 @@ TEST(Lens, UndistortedPictureIsTheIdealOne) {
   for (int y = 0; y < 240; ++y)
     for (int x = 0; x < 320; ++x) {
       Eigen::Vector2d const seen = kCamera.ray_direction(x, y).head<2>();
-      Eigen::Vector2d ideal = seen;  // inverse by fixed-point iteration
-      for (int k = 0; k < 50; ++k) ideal += seen - kLens.distort(ideal);
+      Eigen::Vector2d const ideal = kLens.undistort(seen);
       distorted(y, x) = cv::Vec3b::all(cv::saturate_cast<std::uint8_t>(value(ideal)));
     }
   cv::Mat3b const ideal = undistort_color(distorted, kCamera, kLens);
@@ -57,6 +71,7 @@ TEST(Lens, BadJsonIsNamed) {
   EXPECT_SCANVIEW_ERROR(Lens::from_json(Json::array({1, 2, 3}), "f"), ErrorCode::bad_input, "distortion");
   EXPECT_SCANVIEW_ERROR(Lens::from_json(Json::array({1, 2, 3, "x"}), "f"), ErrorCode::bad_input, "no number");
   EXPECT_EQ(Lens::from_json(Json::array({1, 2, 3, 4}), "f").k3, 0);
+  EXPECT_EQ(Lens::from_json(Json::array({1, 2, 3, 4, 5, 6, 7, 8}), "f").k6, 8);
 }
 
 }  // namespace
