@@ -141,7 +141,8 @@ void write_stereo_rig(fs::path const& path, StereoRig const& rig) {
   if (!rig.standard_deviations.empty()) {
     file << "standard_deviations"
          << "{";
-    for (auto [name, value] : rig.standard_deviations) {
+    for (auto const& [dotted, value] : rig.standard_deviations) {
+      std::string name = dotted;
       if (auto const at = name.find('.'); at != std::string::npos) name.replace(at, 1, 2, '_');
       file << name << value;
     }

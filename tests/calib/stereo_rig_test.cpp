@@ -15,7 +15,7 @@ StereoRig some_rig() {
   rig.left = {Camera::perspective(640, 480, 700, 701, 320.25, 239.5), {-0.1, 0.02, 0.001, -0.002, 0.03, 0, 0, 0}};
   rig.right = {Camera::perspective(640, 480, 705, 706, 318, 241), {-0.2, 0.1, 0, 0, 0, 0.1, 0.2, 0.3}};
   rig.right_from_left.linear() = Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.1, 1, -0.2).normalized()).matrix();
-  rig.right_from_left.translation() = {-100.5, 2, 13};
+  rig.right_from_left.translation() = Eigen::Vector3d(-100.5, 2, 13);
   rig.standard_deviations = {{"left.fx", 0.25}, {"translation.z", 0.125}};
   return rig;
 }
