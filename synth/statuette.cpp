@@ -1,13 +1,11 @@
 #include "synth/statuette.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
-#include "base/parallel.h"
+#include "synth/assembly.h"
 #include "synth/distance_field.h"
-#include "synth/isosurface.h"
 #include "synth/statuette_paint.h"
 #include "synth/statuette_plan.h"
 
@@ -90,14 +88,6 @@ float leaves_distance(Vector3f const& p) {
   return std::min(leaf_distance(p, left), leaf_distance(p, right));
 }
 
-/// One of the object's parts: evaluated only where its bounding sphere can matter.
-struct Part {
-  StatuettePart name;
-  Vector3f center;
-  float radius;
-  float (*distance)(Vector3f const&);
-};
-
 float dog_distance(Vector3f const& p) {
   float d = torso_distance(p);
   constexpr float kTailFillet = 3, kHeadFillet = 5;
@@ -123,37 +113,25 @@ float ladybird_distance(Vector3f const& p) {
   return ellipsoid_distance(ladybird_frame().local(p), {0, 0, 0}, {2.6f, 2.0f, 3.2f});
 }
 
-std::array<Part, 12> const& parts() {
-  static std::array<Part, 12> const all = {{
-      {StatuettePart::plinth, {0, 6, 0}, 40, plinth_distance},
-      {StatuettePart::dog, {0, 52, 0}, 62, dog_distance},
-      {StatuettePart::nose, head_frame_inverse({0, 75, 32}), 4, nose_distance},
-      {StatuettePart::tongue, head_frame_inverse({0, 65, 30}), 5, tongue_distance},
-      {StatuettePart::collar, {0, 60.2f, 5.6f}, 14, collar_distance},
-      {StatuettePart::tag, kTag, 5, tag_distance},
-      {StatuettePart::hoop, kHoop, 17, hoop_distance},
-      {StatuettePart::stem, {27, 30, 14}, 24, stem_distance},
-      {StatuettePart::leaf, {28, 25, 14}, 20, leaves_distance},
-      {StatuettePart::petals, kFlower, 15, blossom_distance},
-      {StatuettePart::button, kFlower, 5, button_distance},
-      {StatuettePart::ladybird, kLadybird, 4, ladybird_distance},
-  }};
-  return all;
+Solid part(StatuettePart name, Vector3f const& center, float radius, float (*distance)(Vector3f const&)) {
+  return {center, radius, distance, [name](Vector3f const& p) { return paint_statuette(p, name); }};
 }
 
-struct Nearest {
-  float distance = 1e9f;
-  StatuettePart part = StatuettePart::plinth;
-};
-
-Nearest nearest_part(Vector3f const& p) {
-  Nearest nearest;
-  for (Part const& part : parts()) {
-    if (sphere_distance(p, part.center, part.radius) > nearest.distance) continue;
-    float const d = part.distance(p);
-    if (d < nearest.distance) nearest = {d, part.name};
-  }
-  return nearest;
+std::vector<Solid> parts() {
+  return {
+      part(StatuettePart::plinth, {0, 6, 0}, 40, plinth_distance),
+      part(StatuettePart::dog, {0, 52, 0}, 62, dog_distance),
+      part(StatuettePart::nose, head_frame_inverse({0, 75, 32}), 4, nose_distance),
+      part(StatuettePart::tongue, head_frame_inverse({0, 65, 30}), 5, tongue_distance),
+      part(StatuettePart::collar, {0, 60.2f, 5.6f}, 14, collar_distance),
+      part(StatuettePart::tag, kTag, 5, tag_distance),
+      part(StatuettePart::hoop, kHoop, 17, hoop_distance),
+      part(StatuettePart::stem, {27, 30, 14}, 24, stem_distance),
+      part(StatuettePart::leaf, {28, 25, 14}, 20, leaves_distance),
+      part(StatuettePart::petals, kFlower, 15, blossom_distance),
+      part(StatuettePart::button, kFlower, 5, button_distance),
+      part(StatuettePart::ladybird, kLadybird, 4, ladybird_distance),
+  };
 }
 
 }  // namespace
@@ -162,16 +140,7 @@ TriangleMesh make_statuette(float spacing_mm, Context& context) {
   Eigen::AlignedBox3f const box(Vector3f(-44, -3, -46), Vector3f(46, 107, 44));
   // Bent parts overestimate the distance by up to a tenth.
   float const slack = 1.25f;
-  TriangleMesh mesh =
-      polygonise([](Vector3f const& p) { return nearest_part(p).distance; }, box, spacing_mm, slack, context);
-  mesh.colors.resize(mesh.vertices.size());
-  constexpr std::size_t kChunk = 1 << 13;
-  for_each_index(context, (mesh.vertices.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    std::size_t const end = std::min(mesh.vertices.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i)
-      mesh.colors[i] = paint_statuette(mesh.vertices[i], nearest_part(mesh.vertices[i]).part);
-  });
-  return mesh;
+  return make_assembly(parts(), box, spacing_mm, slack, context);
 }
 
 }  // namespace scanview

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
+
+#include "synth/paint.h"
 
 namespace scanview {
 namespace {
@@ -11,46 +12,6 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr float kPi = std::numbers::pi_v<float>;
-
-/// sRGB, R G B in [0, 1].
-Vector3f rgb(std::uint32_t hex) {
-  return Vector3f(static_cast<float>(hex >> 16), static_cast<float>((hex >> 8) & 255), static_cast<float>(hex & 255)) /
-         255.0f;
-}
-
-/// 0 below `edge`, 1 above, with a soft step `width` wide.
-float step(float edge, float x, float width) {
-  float const t = std::clamp((x - edge) / width + 0.5f, 0.0f, 1.0f);
-  return t * t * (3 - 2 * t);
-}
-float inside(float distance, float width = 0.3f) { return 1 - step(0, distance, width); }
-
-Vector3f mix(Vector3f const& a, Vector3f const& b, float t) { return a + (b - a) * t; }
-
-/// Words drawn once into a picture: `ink` is the share of ink in [0, 1] at a place in the text's own units, height 1.
-class Lettering {
- public:
-  explicit Lettering(char const* words) {
-    int baseline = 0;
-    cv::Size const size = cv::getTextSize(words, cv::FONT_HERSHEY_DUPLEX, kScale, kThickness, &baseline);
-    ink_ = cv::Mat1b(kHeight, size.width + 8, static_cast<uchar>(0));
-    cv::putText(ink_, words, {4, kHeight - 16}, cv::FONT_HERSHEY_DUPLEX, kScale, cv::Scalar(255), kThickness,
-                cv::LINE_8);
-    cv::GaussianBlur(ink_, ink_, {5, 5}, 0);
-  }
-  float width() const { return static_cast<float>(ink_.cols) / kHeight; }
-  /// x from 0 to width(), y from 0 (bottom) to 1.
-  float ink(float x, float y) const {
-    int const u = static_cast<int>(std::floor(x * kHeight)), v = static_cast<int>(std::floor((1 - y) * kHeight));
-    if (u < 0 || v < 0 || u >= ink_.cols || v >= ink_.rows) return 0;
-    return static_cast<float>(ink_(v, u)) / 255.0f;
-  }
-
- private:
-  static constexpr int kHeight = 64, kThickness = 5;
-  static constexpr double kScale = 1.7;
-  cv::Mat1b ink_;
-};
 
 Vector3f paint_plinth_side(Vector3f const& p) {
   static Lettering const words("scanview");
@@ -76,7 +37,7 @@ Vector3f paint_plinth_side(Vector3f const& p) {
     if (static_cast<int>(index + kDiamonds) % 3 == 0) pattern = std::max(pattern, inside(diamond - 0.55f, 0.15f));
   }
   Vector3f color = mix(band, cream, pattern);
-  float const rim = std::max(step(9.6f, p.y(), 0.3f), 1 - step(2.4f, p.y(), 0.3f));
+  float const rim = std::max(soft_step(9.6f, p.y(), 0.3f), 1 - soft_step(2.4f, p.y(), 0.3f));
   return mix(color, cream, rim);
 }
 
@@ -96,7 +57,7 @@ Vector3f paint_plinth_top(Vector3f const& p) {
   color = mix(color, rgb(0xf5b921), inside(d - 0.65f));
   Vector3f const cream = rgb(0xf2e3c2) * (1.0f + 0.05f * fractal_noise(p * 0.9f, 3));
   float const edge = kPlinthRadius - 2.6f + 0.5f * std::sin(40 * std::atan2(p.x(), p.z()));
-  return mix(color, cream, step(edge, r, 0.35f));
+  return mix(color, cream, soft_step(edge, r, 0.35f));
 }
 
 Vector3f paint_plinth_bottom(Vector3f const& p) {
@@ -107,8 +68,8 @@ Vector3f paint_plinth_bottom(Vector3f const& p) {
       inside(std::abs(r - 30) - 0.8f) + inside(std::abs(r - 34) - 0.35f) + inside(std::abs(r - 16) - 0.5f);
   float const text_height = 6;
   float const text = words.ink((p.x() + 0.5f * words.width() * text_height) / text_height, p.z() / text_height + 0.5f);
-  float const spokes =
-      inside(std::abs(std::sin(6 * std::atan2(p.z(), p.x()))) * r - 1.2f) * step(19, r, 0.4f) * (1 - step(28, r, 0.4f));
+  float const spokes = inside(std::abs(std::sin(6 * std::atan2(p.z(), p.x()))) * r - 1.2f) * soft_step(19, r, 0.4f) *
+                       (1 - soft_step(28, r, 0.4f));
   return mix(clay, rgb(0x4a2a1a), std::clamp(rings + text + spokes, 0.0f, 1.0f));
 }
 
@@ -160,7 +121,7 @@ Vector3f paint_dog(Vector3f const& p) {
   coat = std::max(coat, inside(sphere_distance(p, {22, 24, -2}, 7.5f) + edge_noise, 0.8f));
   coat = std::max(coat, inside(sphere_distance(p, {-20, 30, 4}, 5.5f) + edge_noise, 0.8f));
   bool const on_tail = p.z() < -25 && (p.x() > 4 || p.z() < -30);
-  if (on_tail) coat = 1 - step(40 + edge_noise, p.y(), 1.0f);
+  if (on_tail) coat = 1 - soft_step(40 + edge_noise, p.y(), 1.0f);
   if (on_head) {
     coat = 0;
     coat = inside(ear_distance({std::abs(h.x()), h.y(), h.z()}) - 0.9f + 0.3f * edge_noise, 0.8f);
@@ -170,17 +131,12 @@ Vector3f paint_dog(Vector3f const& p) {
   color = mix(color, mix(brown, dark, std::clamp(0.5f + 0.9f * fractal_noise(p * 0.13f, 3), 0.0f, 1.0f)), coat);
   // Spots on what stayed cream: a jittered grid of three sizes.
   if (!on_head && !on_tail) {
-    Vector3f const cell = (p / 8.5f).array().floor();
-    Vector3f const jitter(value_noise(cell * 2.7f), value_noise(cell * 3.9f + Vector3f::Constant(9)),
-                          value_noise(cell * 5.1f + Vector3f::Constant(5)));
-    Vector3f const spot = (cell + Vector3f::Constant(0.5f) + 0.25f * jitter) * 8.5f;
-    float const size = 2.0f + 1.6f * jitter.x();
-    float const belly = step(0, p.z() - 6, 4) * step(24, p.y(), 4);  // white breast
-    color = mix(color, rgb(0x7b4a28),
-                inside((p - spot).norm() - size + 0.3f * edge_noise, 0.4f) * (1 - coat) * (1 - belly));
+    float const spots = spots_distance(p, 8.5f, 2);
+    float const belly = soft_step(0, p.z() - 6, 4) * soft_step(24, p.y(), 4);  // white breast
+    color = mix(color, rgb(0x7b4a28), inside(spots + 0.3f * edge_noise, 0.4f) * (1 - coat) * (1 - belly));
   }
   if (on_head && h.z() > 18) {
-    color = mix(color, rgb(0x3a1c14), inside(mouth_distance(h) - 0.42f) * step(26.5f, h.z(), 1));
+    color = mix(color, rgb(0x3a1c14), inside(mouth_distance(h) - 0.42f) * soft_step(26.5f, h.z(), 1));
     // Freckles beside the nose.
     float const fx = std::abs(h.x()) - 4.2f, fy = h.y() - 72;
     float const freckle = std::hypot(fx - 1.7f * std::round(std::clamp(fx / 1.7f, -0.5f, 0.5f)),
@@ -191,7 +147,7 @@ Vector3f paint_dog(Vector3f const& p) {
   // Claws, as lines between the toes.
   if (p.y() < 16.8f && p.z() > 22) {
     float const x = std::abs(p.x());
-    color = mix(color, rgb(0x4a2c1a), inside(std::abs(x - 7.9f) - 0.3f) * step(24, p.z(), 0.6f));
+    color = mix(color, rgb(0x4a2c1a), inside(std::abs(x - 7.9f) - 0.3f) * soft_step(24, p.z(), 0.6f));
   }
   return color * (1.0f + 0.13f * hairs(p) + 0.06f * fractal_noise(p * 0.05f, 2));
 }
@@ -223,9 +179,9 @@ Vector3f paint_hoop(Vector3f const& p) {
   float const wave = std::sin(9 * around + about);
   Vector3f const white = rgb(0xfbf6ea), blue = rgb(0x2a78b5), red = rgb(0xd8442f);
   Vector3f const stripe = std::sin(4.5f * around + 0.5f * about) > 0 ? blue : red;
-  Vector3f color = mix(white, stripe, step(0, wave, 0.22f));
+  Vector3f color = mix(white, stripe, soft_step(0, wave, 0.22f));
   float const speckle = value_noise(p * 1.9f);
-  return color * (1.0f - 0.14f * step(0.45f, speckle, 0.2f)) * (1.0f + 0.05f * fractal_noise(p * 0.4f, 3));
+  return color * (1.0f - 0.14f * soft_step(0.45f, speckle, 0.2f)) * (1.0f + 0.05f * fractal_noise(p * 0.4f, 3));
 }
 
 Vector3f paint_leaf(Vector3f const& p) {
@@ -245,7 +201,7 @@ Vector3f paint_petals(Vector3f const& p) {
   float const turn = around - sector * std::round(around / sector);
   Vector3f color = mix(rgb(0xffd9e6), rgb(0xe5487f), std::clamp((r - 4) / 8, 0.0f, 1.0f));
   float const streak = std::abs(std::sin(turn * 14));
-  color = mix(color, rgb(0xb51f5b), 0.6f * inside(streak - 0.35f, 0.2f) * (1 - step(9.5f, r, 2)));
+  color = mix(color, rgb(0xb51f5b), 0.6f * inside(streak - 0.35f, 0.2f) * (1 - soft_step(9.5f, r, 2)));
   return color * (1.0f + 0.07f * fractal_noise(p * 0.9f, 3));
 }
 
@@ -254,7 +210,7 @@ Vector3f paint_button(Vector3f const& p) {
   // Seeds on two families of spirals.
   float const r = std::hypot(f.x(), f.y()), around = std::atan2(f.y(), f.x());
   float const seeds = std::sin(8 * around + 4 * r) * std::sin(8 * around - 4 * r);
-  return mix(rgb(0xf6c22d), rgb(0x8a4a10), step(0.1f, seeds, 0.3f));
+  return mix(rgb(0xf6c22d), rgb(0x8a4a10), soft_step(0.1f, seeds, 0.3f));
 }
 
 Vector3f paint_ladybird(Vector3f const& p) {
@@ -265,14 +221,16 @@ Vector3f paint_ladybird(Vector3f const& p) {
   return mix(rgb(0xd92a1c), rgb(0x18120f), inside(dots));
 }
 
-Vector3f paint(Vector3f const& p, StatuettePart part) {
+}  // namespace
+
+Vector3f paint_statuette(Vector3f const& p, StatuettePart part) {
   switch (part) {
     case StatuettePart::plinth:
       return paint_plinth(p);
     case StatuettePart::dog:
       return paint_dog(p);
     case StatuettePart::nose:
-      return rgb(0x241a18) * (1.0f + 0.35f * step(0.3f, value_noise(p * 2.2f), 0.3f));
+      return rgb(0x241a18) * (1.0f + 0.35f * soft_step(0.3f, value_noise(p * 2.2f), 0.3f));
     case StatuettePart::tongue:
       return rgb(0xe8757a) * (1.0f - 0.25f * inside(std::abs(head_frame().local(p).x()) - 0.3f));
     case StatuettePart::collar:
@@ -282,7 +240,7 @@ Vector3f paint(Vector3f const& p, StatuettePart part) {
     case StatuettePart::hoop:
       return paint_hoop(p);
     case StatuettePart::stem:
-      return mix(rgb(0x3f7d35), rgb(0x8cbf5a), step(0, std::sin(2.2f * p.y()), 0.6f));
+      return mix(rgb(0x3f7d35), rgb(0x8cbf5a), soft_step(0, std::sin(2.2f * p.y()), 0.6f));
     case StatuettePart::leaf:
       return paint_leaf(p);
     case StatuettePart::petals:
@@ -293,14 +251,6 @@ Vector3f paint(Vector3f const& p, StatuettePart part) {
       return paint_ladybird(p);
   }
   return Vector3f::Ones();
-}
-
-}  // namespace
-
-cv::Vec3b paint_statuette(Vector3f const& p, StatuettePart part) {
-  Vector3f const color = paint(p, part);
-  return {cv::saturate_cast<uchar>(255 * color.z()), cv::saturate_cast<uchar>(255 * color.y()),
-          cv::saturate_cast<uchar>(255 * color.x())};
 }
 
 }  // namespace scanview
