@@ -50,8 +50,8 @@ std::vector<Line> read_lines(fs::path const& path) {
   return lines;
 }
 
-std::map<std::string, RgbdIntrinsics> read_cameras(fs::path const& path) {
-  std::map<std::string, RgbdIntrinsics> cameras;
+std::map<std::string, LensCamera> read_cameras(fs::path const& path) {
+  std::map<std::string, LensCamera> cameras;
   for (auto const& [line, words] : read_lines(path)) {
     if (words.empty()) continue;
     if (words.size() < 5) fail(path, fmt::format("line {} is not 'id model width height parameters'", line));
@@ -69,7 +69,7 @@ std::map<std::string, RgbdIntrinsics> read_cameras(fs::path const& path) {
       fail(path, fmt::format("line {}: {} has {} parameters, here are {}", line, model, known->second, p.size()));
     bool const two_focals = model == "PINHOLE" || model == "OPENCV";
     std::size_t const at = two_focals ? 2 : 1;
-    RgbdIntrinsics k;
+    LensCamera k;
     if (model == "SIMPLE_RADIAL") k.lens = {.k1 = p[3]};
     if (model == "RADIAL") k.lens = {.k1 = p[3], .k2 = p[4]};
     if (model == "OPENCV") k.lens = {.k1 = p[4], .k2 = p[5], .p1 = p[6], .p2 = p[7]};
@@ -162,7 +162,7 @@ Workspace find_workspace(fs::path const& path) {
 }
 
 RawView load(Image const& image, Workspace const& workspace, fs::path const& depth_path,
-             std::map<std::string, RgbdIntrinsics> const& cameras) {
+             std::map<std::string, LensCamera> const& cameras) {
   fs::path const list = workspace.model / "images.txt";
   auto const k = cameras.find(image.camera);
   if (k == cameras.end())

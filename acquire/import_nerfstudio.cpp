@@ -47,7 +47,7 @@ fs::path existing(fs::path const& picture) {
 }
 
 /// Intrinsics of a frame: fl_x (or camera_angle_x), fl_y, cx, cy, k1 k2 p1 p2. Sizes w and h may be left out.
-RgbdIntrinsics intrinsics(Json const& frame, Json const& all, cv::Size picture, fs::path const& path) {
+LensCamera intrinsics(Json const& frame, Json const& all, cv::Size picture, fs::path const& path) {
   if (Json const* const model = lookup(frame, all, "camera_model"); model != nullptr)
     if (!model->is_string() || (*model != "OPENCV" && *model != "PINHOLE" && *model != "SIMPLE_PINHOLE"))
       fail(path, "'camera_model' is none of OPENCV, PINHOLE, SIMPLE_PINHOLE");
@@ -63,7 +63,7 @@ RgbdIntrinsics intrinsics(Json const& frame, Json const& all, cv::Size picture, 
   auto const fx = focal("fl_x", "camera_angle_x", width);
   if (!fx) fail(path, "intrinsics are missing: neither 'fl_x' nor 'camera_angle_x'");
   double const fy = focal("fl_y", "camera_angle_y", height).value_or(*fx);
-  RgbdIntrinsics result;
+  LensCamera result;
   // Their principal point counts from the picture's corner, ours from the centre of the first pixel.
   result.camera = Camera::perspective(picture.width, picture.height, *fx, fy, get("cx").value_or(width / 2) - 0.5,
                                       get("cy").value_or(height / 2) - 0.5);
@@ -101,7 +101,7 @@ RawView load(Json const& frame, Json const& all, FrameFiles const& files, double
   RawView raw;
   raw.object_from_camera = pose(frame, path);
   cv::Mat3b const color = read_color(files.color);
-  RgbdIntrinsics const k = intrinsics(frame, all, color.size(), path);
+  LensCamera const k = intrinsics(frame, all, color.size(), path);
   raw.camera = k.camera;
   raw.color = undistort_color(color, k.camera, k.lens);
   cv::Mat const stored = read_image(files.depth);

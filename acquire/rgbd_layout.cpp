@@ -180,12 +180,12 @@ std::vector<StampedPose> read_trajectory(fs::path const& path) {
   return poses;
 }
 
-RgbdIntrinsics tum_intrinsics(fs::path const& folder, cv::Size size, std::vector<std::string>& warnings) {
+LensCamera tum_intrinsics(fs::path const& folder, cv::Size size, std::vector<std::string>& warnings) {
   std::string const name = fs::absolute(folder).lexically_normal().string();
   auto const named = [&](char const* long_name, char const* short_name) {
     return name.find(long_name) != std::string::npos || name.find(short_name) != std::string::npos;
   };
-  RgbdIntrinsics result;
+  LensCamera result;
   std::string whose = "the Kinect's";
   double k[4] = {525.0, 525.0, 319.5, 239.5};
   auto const take = [&](std::string const& of, double fx, double fy, double cx, double cy, Lens lens) {
@@ -286,7 +286,7 @@ std::vector<Eigen::Matrix4d> read_log(fs::path const& path) {
   return matrices;
 }
 
-RgbdIntrinsics read_open3d_intrinsics(fs::path const& path) {
+LensCamera read_open3d_intrinsics(fs::path const& path) {
   Json const json = read_json(path);
   auto const numbers = [&](char const* key, std::size_t count) {
     auto const found = json.find(key);

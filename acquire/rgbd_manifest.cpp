@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <initializer_list>
 #include <numbers>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/json_fields.h"
 
 namespace scanview {
 namespace {
@@ -20,72 +20,25 @@ constexpr int kMostFrames = 1'000'000;
   throw Error(ErrorCode::bad_input, path, message);
 }
 
-void refuse_unknown(Json const& json, std::initializer_list<std::string_view> known, std::string const& where,
-                    std::filesystem::path const& path) {
-  if (!json.is_object())
-    fail(path, where.empty() ? "the file is no JSON object" : fmt::format("'{}' is no JSON object", where));
-  std::string unknown;
-  for (auto const& [key, value] : json.items())
-    if (std::find(known.begin(), known.end(), key) == known.end())
-      unknown += fmt::format("{}'{}'", unknown.empty() ? "" : ", ", key);
-  if (!unknown.empty())
-    fail(path, where.empty() ? "unknown key " + unknown : fmt::format("unknown key {} in '{}'", unknown, where));
-}
-
-Json const& member(Json const& json, char const* key, std::filesystem::path const& path) {
-  auto const found = json.find(key);
-  if (found == json.end()) fail(path, fmt::format("'{}' is missing", key));
-  return *found;
-}
-
-double number(Json const& json, std::string const& key, std::filesystem::path const& path) {
-  if (!json.is_number() || !std::isfinite(json.get<double>())) fail(path, fmt::format("'{}' is no finite number", key));
-  return json.get<double>();
-}
-
-int integer(Json const& json, std::string const& key, int low, int high, std::filesystem::path const& path) {
-  if (!json.is_number_integer() || json.get<double>() < low || json.get<double>() > high)
-    fail(path, fmt::format("'{}' is no integer in {} .. {}", key, low, high));
-  return json.get<int>();
-}
-
-std::string text(Json const& json, std::string const& key, std::filesystem::path const& path) {
-  if (!json.is_string()) fail(path, fmt::format("'{}' is no text", key));
-  return json.get<std::string>();
-}
-
 Eigen::Vector3d vector3(Json const& json, std::string const& key, std::filesystem::path const& path) {
   if (!json.is_array() || json.size() != 3) fail(path, fmt::format("'{}' is not three numbers", key));
-  return {number(json[0], key, path), number(json[1], key, path), number(json[2], key, path)};
-}
-
-RgbdIntrinsics intrinsics(Json const& json, std::string const& key, std::filesystem::path const& path) {
-  refuse_unknown(json, {"width", "height", "fx", "fy", "cx", "cy", "distortion"}, key, path);
-  RgbdIntrinsics result;
-  Json camera = json;
-  if (auto const found = json.find("distortion"); found != json.end()) {
-    if (!found->is_null()) result.lens = Lens::from_json(*found, path);
-    camera.erase("distortion");
-  }
-  camera["model"] = "perspective";
-  result.camera = Camera::from_json(camera, path);
-  return result;
+  return {json_finite(json[0], key, path), json_finite(json[1], key, path), json_finite(json[2], key, path)};
 }
 
 /// The camera stood still and the object turned: p_camera_i = T_i p_camera_0, so object_from_camera_i = T_i^-1 in the
 /// frame that the first view's camera sees.
 std::vector<Eigen::Isometry3d> turntable_poses(Json const& json, std::size_t frames,
                                                std::filesystem::path const& path) {
-  refuse_unknown(json, {"axis_point", "axis", "angles_deg"}, "turntable", path);
-  Eigen::Vector3d const point = vector3(member(json, "axis_point", path), "axis_point", path);
-  Eigen::Vector3d const axis = vector3(member(json, "axis", path), "axis", path);
+  refuse_unknown_keys(json, {"axis_point", "axis", "angles_deg"}, "turntable", path);
+  Eigen::Vector3d const point = vector3(json_member(json, "axis_point", path), "axis_point", path);
+  Eigen::Vector3d const axis = vector3(json_member(json, "axis", path), "axis", path);
   if (!(axis.norm() > 1e-9)) fail(path, "'axis' of the turntable has no direction");
-  Json const& angles = member(json, "angles_deg", path);
+  Json const& angles = json_member(json, "angles_deg", path);
   if (!angles.is_array() || angles.size() != frames)
     fail(path, fmt::format("'angles_deg' has {} entries for {} views", angles.is_array() ? angles.size() : 0, frames));
   std::vector<Eigen::Isometry3d> poses;
   for (auto const& angle : angles) {
-    double const radians = number(angle, "angles_deg", path) * std::numbers::pi / 180;
+    double const radians = json_finite(angle, "angles_deg", path) * std::numbers::pi / 180;
     poses.push_back(Eigen::Translation3d(point) * Eigen::AngleAxisd(-radians, axis.normalized()) *
                     Eigen::Translation3d(-point));
   }
@@ -136,43 +89,42 @@ Eigen::Isometry3d read_pose_text(std::filesystem::path const& path) {
 
 RgbdSource read_rgbd_manifest(std::filesystem::path const& path) {
   Json const json = read_json(path);
-  refuse_unknown(json,
-                 {"color", "depth", "first", "last", "step", "depth_unit", "unit", "missing", "depth_rotate_right",
-                  "intrinsics", "depth_intrinsics", "color_from_depth", "poses", "turntable", "fixed_camera"},
-                 "", path);
+  refuse_unknown_keys(json,
+                      {"color", "depth", "first", "last", "step", "depth_unit", "unit", "missing", "depth_rotate_right",
+                       "intrinsics", "depth_intrinsics", "color_from_depth", "poses", "turntable", "fixed_camera"},
+                      "", path);
   RgbdSource source;
   source.files.push_back(path);
-  std::string const color = text(member(json, "color", path), "color", path);
-  std::string const depth = text(member(json, "depth", path), "depth", path);
-  int const first = integer(member(json, "first", path), "first", 0, kMostFrames, path);
-  int const last = integer(member(json, "last", path), "last", 0, kMostFrames, path);
-  int const step = json.contains("step") ? integer(json["step"], "step", 1, kMostFrames, path) : 1;
+  std::string const color = json_text(json_member(json, "color", path), "color", path);
+  std::string const depth = json_text(json_member(json, "depth", path), "depth", path);
+  int const first = json_integer(json_member(json, "first", path), "first", 0, kMostFrames, path);
+  int const last = json_integer(json_member(json, "last", path), "last", 0, kMostFrames, path);
+  int const step = json.contains("step") ? json_integer(json["step"], "step", 1, kMostFrames, path) : 1;
   if (last < first) fail(path, fmt::format("'last' ({}) is less than 'first' ({})", last, first));
 
-  if (json.contains("depth_unit")) source.depth_unit = number(json["depth_unit"], "depth_unit", path);
+  if (json.contains("depth_unit")) source.depth_unit = json_finite(json["depth_unit"], "depth_unit", path);
   if (!(source.depth_unit > 0)) fail(path, "'depth_unit' is not positive");
-  if (json.contains("unit")) source.unit = unit_from_string(text(json["unit"], "unit", path), path);
+  if (json.contains("unit")) source.unit = unit_from_string(json_text(json["unit"], "unit", path), path);
   if (json.contains("missing")) {
     source.missing.clear();
     if (!json["missing"].is_array()) fail(path, "'missing' is no list");
-    for (auto const& value : json["missing"]) source.missing.push_back(integer(value, "missing", 0, 65535, path));
+    for (auto const& value : json["missing"]) source.missing.push_back(json_integer(value, "missing", 0, 65535, path));
   }
   if (json.contains("depth_rotate_right"))
-    source.depth_rotate_right = integer(json["depth_rotate_right"], "depth_rotate_right", 0, 15, path);
-  source.color = intrinsics(member(json, "intrinsics", path), "intrinsics", path);
+    source.depth_rotate_right = json_integer(json["depth_rotate_right"], "depth_rotate_right", 0, 15, path);
+  source.color = lens_camera_from_json(json_member(json, "intrinsics", path), "intrinsics", path);
   if (json.contains("depth_intrinsics") != json.contains("color_from_depth"))
     fail(path, "'depth_intrinsics' and 'color_from_depth' belong together: one is missing");
   if (json.contains("depth_intrinsics")) {
-    source.depth = intrinsics(json["depth_intrinsics"], "depth_intrinsics", path);
+    source.depth = lens_camera_from_json(json["depth_intrinsics"], "depth_intrinsics", path);
     source.color_from_depth = pose_from_json(json["color_from_depth"], path, "'color_from_depth'");
   }
   if (json.contains("fixed_camera")) {
-    if (!json["fixed_camera"].is_boolean()) fail(path, "'fixed_camera' is neither true nor false");
-    source.fixed_camera = json["fixed_camera"].get<bool>();
+    source.fixed_camera = json_boolean(json["fixed_camera"], "fixed_camera", path);
   }
 
   if (json.contains("poses") && json.contains("turntable")) fail(path, "'poses' and 'turntable' exclude each other");
-  std::string const poses = json.contains("poses") ? text(json["poses"], "poses", path) : "none";
+  std::string const poses = json.contains("poses") ? json_text(json["poses"], "poses", path) : "none";
   auto const folder = path.parent_path();
   for (int index = first; index <= last; index += step) {
     RgbdFrame frame;

@@ -6,16 +6,9 @@
 #include <vector>
 
 #include "acquire/scan_set.h"
-#include "calib/camera.h"
-#include "calib/lens.h"
+#include "calib/stereo_rig.h"
 
 namespace scanview {
-
-/// A camera as it was calibrated: the ideal part and the distortion that import removes.
-struct RgbdIntrinsics {
-  Camera camera;
-  Lens lens;
-};
 
 /// One colour and one depth file, and where they were taken from.
 struct RgbdFrame {
@@ -33,8 +26,8 @@ struct RgbdSource {
   Unit unit = Unit::m;
   std::vector<int> missing{0};  ///< values (after the rotation) that say "no depth"
   int depth_rotate_right = 0;   ///< bits; SUN RGB-D and some robots store rotated values
-  RgbdIntrinsics color;
-  std::optional<RgbdIntrinsics> depth;  ///< where the depth camera is not the colour camera
+  LensCamera color;
+  std::optional<LensCamera> depth;  ///< where the depth camera is not the colour camera
   Eigen::Isometry3d color_from_depth = Eigen::Isometry3d::Identity();
   bool fixed_camera = false;                 ///< the object turned, so the background stays
   std::vector<std::filesystem::path> files;  ///< that were read to know all this

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/json_fields.h"
 
 namespace scanview {
 namespace {
@@ -86,6 +87,19 @@ Eigen::Vector2d LensCamera::project(Eigen::Vector3d const& p) const {
 
 Eigen::Vector3d LensCamera::ray(Eigen::Vector2d const& pixel) const {
   return lens.undistort(camera.ray_direction(pixel.x(), pixel.y()).head<2>()).homogeneous();
+}
+
+LensCamera lens_camera_from_json(Json const& json, std::string const& key, fs::path const& path) {
+  refuse_unknown_keys(json, {"width", "height", "fx", "fy", "cx", "cy", "distortion"}, key, path);
+  LensCamera result;
+  Json camera = json;
+  if (auto const found = json.find("distortion"); found != json.end()) {
+    if (!found->is_null()) result.lens = Lens::from_json(*found, path);
+    camera.erase("distortion");
+  }
+  camera["model"] = "perspective";
+  result.camera = Camera::from_json(camera, path);
+  return result;
 }
 
 StereoRig read_stereo_rig(fs::path const& path, cv::Size fallback_size) {

@@ -21,6 +21,10 @@ struct LensCamera {
   Eigen::Vector3d ray(Eigen::Vector2d const& pixel) const;
 };
 
+/// {"width", "height", "fx", "fy", "cx", "cy", "distortion"}, the last optional; throws Error{bad_input, path}. `key`
+/// is what messages call the object.
+LensCamera lens_camera_from_json(Json const& json, std::string const& key, std::filesystem::path const& path);
+
 /// Two cameras that are fixed to each other.
 struct StereoRig {
   LensCamera left, right;
