@@ -66,6 +66,16 @@ cv::Vec3b class_color(std::uint8_t value) {
       return {40, 40, 220};
     case PixelClass::no_depth:
       return {40, 170, 230};
+    case PixelClass::no_light:
+      return {90, 60, 60};
+    case PixelClass::saturated:
+      return {120, 240, 250};
+    case PixelClass::several_peaks:
+      return {200, 60, 200};
+    case PixelClass::no_partner:
+      return {200, 140, 40};
+    case PixelClass::inconsistent:
+      return {60, 200, 90};
   }
   return {255, 0, 255};
 }

@@ -16,7 +16,13 @@ enum class PixelClass : std::uint8_t {
   cut = 40,        ///< outside the box or below the ground plane that was asked for
   outlier = 80,    ///< a depth that stands alone or flies between two surfaces
   no_depth = 160,  ///< object (or unknown), but the sensor gave nothing
-  object = 255,    ///< has a depth
+  // Why an active-light scanner gave nothing (acquire.h):
+  no_light = 100,       ///< the light did not reach it, or too little came back
+  saturated = 120,      ///< too bright to tell when or where the light was
+  several_peaks = 140,  ///< lit more than once: an edge, a glossy reflection, or code bits that contradict each other
+  no_partner = 180,     ///< the other camera sees no such code on the epipolar line
+  inconsistent = 200,   ///< several partners, or the partner's partner is another pixel
+  object = 255,         ///< has a depth
 };
 
 /// Colour and range from one camera. depth, sigma, color and classes have the camera's size. A depth is finite and

@@ -53,14 +53,16 @@ bool is_complete(std::string const& bytes) {
 
 }  // namespace
 
-cv::Mat read_image(std::filesystem::path const& path) {
+namespace {
+
+cv::Mat decode_file(std::filesystem::path const& path, int flags) {
   std::string const bytes = read_file(path);
   if (bytes.empty()) throw Error(ErrorCode::bad_input, path, "is empty");
   if (!is_complete(bytes)) throw Error(ErrorCode::bad_input, path, "is truncated or damaged");
   cv::Mat image;
   try {
     cv::Mat const raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-    image = cv::imdecode(raw, cv::IMREAD_UNCHANGED);
+    image = cv::imdecode(raw, flags);
   } catch (cv::Exception const&) {
     // Reported below, like every other file that cannot be decoded.
   }
@@ -69,6 +71,14 @@ cv::Mat read_image(std::filesystem::path const& path) {
   if (image.depth() != CV_8U && image.depth() != CV_16U)
     throw Error(ErrorCode::bad_input, path, "is neither an 8-bit nor a 16-bit picture");
   return image;
+}
+
+}  // namespace
+
+cv::Mat read_image(std::filesystem::path const& path) { return decode_file(path, cv::IMREAD_UNCHANGED); }
+
+cv::Mat read_gray(std::filesystem::path const& path) {
+  return decode_file(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
 cv::Mat3b read_color(std::filesystem::path const& path) {

@@ -10,6 +10,9 @@ namespace scanview {
 /// empty image. Pictures of more than 2^28 pixels are refused.
 cv::Mat read_image(std::filesystem::path const& path);
 
+/// One channel of 8 or 16 bits; colour becomes luma. What a camera measures, for decoding.
+cv::Mat read_gray(std::filesystem::path const& path);
+
 /// 8-bit BGR of any picture: gray is repeated, alpha dropped, 16 bits divided by 257.
 cv::Mat3b read_color(std::filesystem::path const& path);
 

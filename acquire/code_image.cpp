@@ -1,0 +1,135 @@
+#include "acquire/code_image.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace scanview {
+namespace {
+
+constexpr float kGentle = 3;
+constexpr float kSteep = 12;
+constexpr float kSigmas = 4;
+constexpr float kBendSigmas = 5;
+
+/// Median of |code(p + step) - code(p)| on every fourth row.
+float median_change(CodeImage const& image, int dx, int dy) {
+  std::vector<float> changes;
+  for (int y = 0; y + dy < image.code.rows; y += 4)
+    for (int x = 0; x + dx < image.code.cols; ++x) {
+      float const change = std::abs(image.code(y + dy, x + dx) - image.code(y, x));
+      if (std::isfinite(change)) changes.push_back(change);
+    }
+  if (changes.empty()) return 0;
+  auto const middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  return *middle;
+}
+
+/// Whether the change from p to q is one of a surface; `before` and `after` are the changes on both sides of it (NaN
+/// where there are none).
+bool is_linked(float before, float change, float after, float noise, float typical) {
+  float const size = std::abs(change);
+  if (size <= kGentle * typical + noise) return true;
+  if (!(size <= kSteep * typical + noise)) return false;  // also NaN
+  float const alike = 0.5f * size + noise;
+  return std::abs(change - before) <= alike || std::abs(change - after) <= alike;
+}
+
+/// What a second difference is beyond noise (whose standard deviation in it is sqrt(6) sigma).
+float beyond_noise(float before, float here, float after, float sigma) {
+  float const bend = std::abs(before - 2 * here + after) - kBendSigmas * sigma;
+  return bend > 0 ? bend : 0;  // also where one is missing
+}
+
+float excess_bend_down(CodeImage const& image, int x, int y) {
+  if (y < 1 || y + 1 >= image.code.rows) return 0;
+  return beyond_noise(image.code(y - 1, x), image.code(y, x), image.code(y + 1, x), image.sigma(y, x));
+}
+
+}  // namespace
+
+float excess_bend(float const* code, float const* sigma, int x, int count) {
+  if (x < 1 || x + 1 >= count) return 0;
+  return beyond_noise(code[x - 1], code[x], code[x + 1], sigma[x]);
+}
+
+CodeLinks link_codes(CodeImage const& image) {
+  CodeLinks links;
+  int const rows = image.code.rows, cols = image.code.cols;
+  links.across = cv::Mat1b(rows, cols, std::uint8_t{0});
+  links.down = cv::Mat1b(rows, cols, std::uint8_t{0});
+  float const across = median_change(image, 1, 0), down = median_change(image, 0, 1);
+  float const typical = std::max(across, down);
+  links.slope = typical;
+  for (int y = 0; y < rows; ++y) {
+    float const *const here = image.code[y], *const sigma = image.sigma[y];
+    for (int x = 0; x + 1 < cols; ++x)
+      links.across(y, x) =
+          is_linked(x > 0 ? here[x] - here[x - 1] : kMissing, here[x + 1] - here[x],
+                    x + 2 < cols ? here[x + 2] - here[x + 1] : kMissing, kSigmas * (sigma[x] + sigma[x + 1]), typical);
+    if (y + 1 == rows) break;
+    float const *const below = image.code[y + 1], *const sigma_below = image.sigma[y + 1];
+    float const* const above = y > 0 ? image.code[y - 1] : nullptr;
+    float const* const far = y + 2 < rows ? image.code[y + 2] : nullptr;
+    for (int x = 0; x < cols; ++x)
+      links.down(y, x) = is_linked(above ? here[x] - above[x] : kMissing, below[x] - here[x],
+                                   far ? far[x] - below[x] : kMissing, kSigmas * (sigma[x] + sigma_below[x]), typical);
+  }
+  return links;
+}
+
+CodeImage resample(CodeImage const& image, CodeLinks const& links, cv::Mat2f const& map) {
+  CodeImage result;
+  result.code = cv::Mat1f(map.size(), kMissing);
+  result.sigma = cv::Mat1f(map.size(), kMissing);
+  result.classes = cv::Mat1b(map.size(), static_cast<std::uint8_t>(PixelClass::no_depth));
+  int const rows = image.code.rows, cols = image.code.cols;
+  auto const unknown_slope = static_cast<float>(links.slope);
+  for (int y = 0; y < map.rows; ++y)
+    for (int x = 0; x < map.cols; ++x) {
+      float const u = map(y, x)[0], v = map(y, x)[1];
+      if (!(u >= -0.5F && v >= -0.5F && u < static_cast<float>(cols) - 0.5F && v < static_cast<float>(rows) - 0.5F))
+        continue;
+      int const nx = static_cast<int>(u + 0.5F), ny = static_cast<int>(v + 0.5F);
+      result.classes(y, x) = image.classes(ny, nx);
+      float const code = image.code(ny, nx);
+      if (std::isnan(code)) continue;
+      float const du = u - static_cast<float>(nx), dv = v - static_cast<float>(ny);
+      int const i = du < 0 ? nx - 1 : nx, j = dv < 0 ? ny - 1 : ny;  // the upper left of the four around
+      if (i >= 0 && j >= 0 && i + 1 < cols && j + 1 < rows && links.across(j, i) && links.across(j + 1, i) &&
+          links.down(j, i) && links.down(j, i + 1)) {
+        float const a = u - static_cast<float>(i), b = v - static_cast<float>(j);
+        float const w[4] = {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
+        float const *c0 = image.code[j] + i, *c1 = image.code[j + 1] + i;
+        float const *s0 = image.sigma[j] + i, *s1 = image.sigma[j + 1] + i;
+        result.code(y, x) = w[0] * c0[0] + w[1] * c0[1] + w[2] * c1[0] + w[3] * c1[1];
+        float const noise = w[0] * w[0] * s0[0] * s0[0] + w[1] * w[1] * s0[1] * s0[1] + w[2] * w[2] * s1[0] * s1[0] +
+                            w[3] * w[3] * s1[1] * s1[1];
+        // Where the surface bends, as at a crease, the plane through four codes is off by a quarter of a second
+        // difference times a (1 - a).
+        float const bend_x = a * (1 - a) * excess_bend(image.code[ny], image.sigma[ny], nx, cols);
+        float const bend_y = b * (1 - b) * excess_bend_down(image, nx, ny);
+        result.sigma(y, x) = std::sqrt(noise + bend_x * bend_x + bend_y * bend_y);
+        continue;
+      }
+      // The change along one axis: towards the place where that side is linked, else from the other side.
+      auto const step = [&](bool linked_after, bool linked_before, float after, float before, float distance) {
+        bool const ahead = distance >= 0 ? linked_after : !linked_before && linked_after;
+        if (ahead) return (after - code) * distance;
+        return linked_before ? (code - before) * distance : kMissing;
+      };
+      float const along =
+          step(nx + 1 < cols && links.across(ny, nx), nx > 0 && links.across(ny, nx - 1),
+               nx + 1 < cols ? image.code(ny, nx + 1) : kMissing, nx > 0 ? image.code(ny, nx - 1) : kMissing, du);
+      float const down =
+          step(ny + 1 < rows && links.down(ny, nx), ny > 0 && links.down(ny - 1, nx),
+               ny + 1 < rows ? image.code(ny + 1, nx) : kMissing, ny > 0 ? image.code(ny - 1, nx) : kMissing, dv);
+      float const doubt = (std::isnan(along) ? std::abs(du) : 0) + (std::isnan(down) ? std::abs(dv) : 0);
+      result.code(y, x) = code + (std::isnan(along) ? 0 : along) + (std::isnan(down) ? 0 : down);
+      result.sigma(y, x) = std::hypot(image.sigma(ny, nx) * (1 + std::abs(du) + std::abs(dv)), doubt * unknown_slope);
+    }
+  return result;
+}
+
+}  // namespace scanview

@@ -1,0 +1,35 @@
+#pragma once
+#include "acquire/pixel_noise.h"
+
+namespace scanview {
+
+/// Brightness over time at one pixel, as samples at whole steps 0 .. count - 1.
+struct PeakSamples {
+  static constexpr int kMost = 16;
+  float value[kMost];
+  bool usable[kMost];  ///< not saturated, within the sweep
+  int count = 0;
+};
+
+/// a + b exp(-(t - t0)² / (2 w²)).
+struct Peak {
+  double ambient = 0, height = 0, time = 0, width = 1;
+  double time_sigma = 0;  ///< from the information matrix
+  double chi_square = 0;  ///< sum of squared residuals over their variances
+  int degrees_of_freedom = 0;
+  bool converged = false;
+  double leverage[PeakSamples::kMost];  ///< share of each sample's own residual that the fit took up
+};
+
+/// What is known of the width beforehand: the same beam passes all pixels. It decides only where a peak is too narrow
+/// to tell its own.
+struct WidthPrior {
+  double width = 1;
+  double sigma = 1e3;  ///< large: nothing is known
+};
+
+/// Maximum likelihood of the four parameters under the noise (Levenberg-Marquardt; the variances are those of the
+/// model, as of the step before). `start_time` is where the greatest value is.
+Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior);
+
+}  // namespace scanview
