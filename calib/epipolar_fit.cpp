@@ -1,14 +1,13 @@
 #include "calib/epipolar_fit.h"
 
-#include <ceres/ceres.h>
-#include <ceres/rotation.h>
-
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
+#include <limits>
+#include <string>
 
 namespace scanview {
 namespace {
@@ -22,52 +21,30 @@ constexpr double kTiny = 1e-18;  // keeps the Sampson distance of a match at the
 using Vector7d = Eigen::Matrix<double, kUnknowns, 1>;
 using Matrix7d = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
-template <typename T>
-using Vector2 = Eigen::Matrix<T, 2, 1>;
-template <typename T>
-using Vector3 = Eigen::Matrix<T, 3, 1>;
-
-template <typename T>
-Vector2<T> distort(Lens const& lens, T const& k1, Vector2<T> const& p) {
-  T const r2 = p.squaredNorm(), x = p.x(), y = p.y();
-  T const radial =
-      (1.0 + r2 * (k1 + r2 * (lens.k2 + r2 * lens.k3))) / (1.0 + r2 * (lens.k4 + r2 * (lens.k5 + r2 * lens.k6)));
-  return {x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x),
-          y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y};
-}
-
 // One pixel through one camera.
 struct Sight {
-  Eigen::Vector2d seen;           // normalised, as the lens bent it
-  Eigen::Vector2d ideal;          // normalised, straight
-  Eigen::Matrix2d ideal_by_seen;  // derivative of the one by the other
-  Eigen::Matrix2d ideal_by_pixel;
-  Lens const* lens = nullptr;
+  Eigen::Vector2d ideal;           // normalised, straight
+  Eigen::Matrix2d ideal_by_pixel;  // derivatives of it
+  Eigen::Vector2d ideal_by_focal = Eigen::Vector2d::Zero(), ideal_by_k1 = Eigen::Vector2d::Zero();
 
-  Sight(LensCamera const& camera, Eigen::Vector2d const& pixel) : lens(&camera.lens) {
-    seen = camera.camera.ray_direction(pixel.x(), pixel.y()).head<2>();
-    ideal = camera.lens.undistort(seen);
-    ideal_by_seen.setIdentity();
-    if (!lens->is_ideal()) {
-      using Jet = ceres::Jet<double, 2>;
-      Vector2<Jet> const p(Jet(ideal.x(), 0), Jet(ideal.y(), 1));
-      Vector2<Jet> const bent = distort<Jet>(*lens, Jet(lens->k1), p);
-      Eigen::Matrix2d seen_by_ideal;
-      seen_by_ideal << bent.x().v.transpose(), bent.y().v.transpose();
-      ideal_by_seen = seen_by_ideal.inverse();
-    }
+  Sight(LensCamera const& camera, Eigen::Vector2d const& pixel) {
+    Lens const& lens = camera.lens;
+    Eigen::Vector2d const seen = camera.camera.ray_direction(pixel.x(), pixel.y()).head<2>();
+    ideal = lens.undistort(seen);
+    double const r2 = ideal.squaredNorm(), x = ideal.x(), y = ideal.y();
+    double const below = 1 + r2 * (lens.k4 + r2 * (lens.k5 + r2 * lens.k6));
+    double const radial = (1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))) / below;
+    double const slope =
+        (lens.k1 + r2 * (2 * lens.k2 + r2 * 3 * lens.k3) - radial * (lens.k4 + r2 * (2 * lens.k5 + r2 * 3 * lens.k6))) /
+        below;
+    Eigen::Matrix2d seen_by_ideal;
+    seen_by_ideal(0, 0) = radial + 2 * x * x * slope + 2 * lens.p1 * y + 6 * lens.p2 * x;
+    seen_by_ideal(1, 1) = radial + 2 * y * y * slope + 6 * lens.p1 * y + 2 * lens.p2 * x;
+    seen_by_ideal(0, 1) = seen_by_ideal(1, 0) = 2 * x * y * slope + 2 * lens.p1 * x + 2 * lens.p2 * y;
+    Eigen::Matrix2d const ideal_by_seen = seen_by_ideal.inverse();
     ideal_by_pixel = ideal_by_seen * Eigen::Vector2d(1 / camera.camera.fx(), 1 / camera.camera.fy()).asDiagonal();
-  }
-
-  // The straight ray under changed intrinsics: two Newton steps with the derivative of the start. The caller starts
-  // again from the result, so what these steps leave does not stay.
-  template <typename T>
-  Vector3<T> ray(T const& log_focal, T const& k1_change) const {
-    Vector2<T> const target = seen.cast<T>() * exp(-log_focal);
-    Vector2<T> p = ideal.cast<T>();
-    for (int step = 0; step < 2; ++step)
-      p += ideal_by_seen.cast<T>() * (target - distort<T>(*lens, lens->k1 + k1_change, p));
-    return p.homogeneous();
+    ideal_by_focal = -ideal_by_seen * seen;  // of its logarithm
+    ideal_by_k1 = -ideal_by_seen * ideal * (r2 / below);
   }
 };
 
@@ -85,34 +62,79 @@ struct PoseStart {
   Eigen::Matrix<double, 3, 2> tangent;
 };
 
-struct EpipolarCost {
-  Sight left, right;
-  PoseStart const* start;
-  double weight;
+// The Sampson distance in standard deviations, and its derivative by the increments at 0.
+struct Term {
+  double residual = 0;
+  Vector7d derivative = Vector7d::Zero();
+};
+
+struct Epipolar {
+  PoseStart const& start;
   bool intrinsics;
 
-  template <typename T>
-  bool operator()(T const* x, T* residual) const {
-    Vector3<T> const p = intrinsics ? left.ray<T>(x[kFocal], x[kK1]) : left.ideal.homogeneous().cast<T>();
-    Vector3<T> const q = intrinsics ? right.ray<T>(x[kFocal], x[kK1]) : right.ideal.homogeneous().cast<T>();
-    Vector3<T> const turned_first = start->rotation.cast<T>() * p;
-    Vector3<T> const t = start->translation.cast<T>() + start->tangent.cast<T>() * Vector2<T>(x[3], x[4]);
-    Vector3<T> turned, back;
-    ceres::AngleAxisRotatePoint(x, turned_first.data(), turned.data());
-    Vector3<T> const line = t.cross(turned);  // derivative of the error by the right ray
-    T const error = q.dot(line);
-    T const inverse[3] = {-x[0], -x[1], -x[2]};
-    Vector3<T> const other = q.cross(t);
-    ceres::AngleAxisRotatePoint(inverse, other.data(), back.data());
-    Vector3<T> const line_left = start->rotation.transpose().cast<T>() * back;
-    Vector2<T> const by_left = left.ideal_by_pixel.transpose().cast<T>() * line_left.template head<2>();
-    Vector2<T> const by_right = right.ideal_by_pixel.transpose().cast<T>() * line.template head<2>();
-    residual[0] = weight * error / sqrt(by_left.squaredNorm() + by_right.squaredNorm() + kTiny);
-    return true;
+  double residual(Sight const& left, Sight const& right) const {
+    Eigen::Vector3d const p = left.ideal.homogeneous(), q = right.ideal.homogeneous();
+    Eigen::Vector3d const line = start.translation.cross(start.rotation * p);
+    Eigen::Vector3d const line_left = start.rotation.transpose() * q.cross(start.translation);
+    double const square = (left.ideal_by_pixel.transpose() * line_left.head<2>()).squaredNorm() +
+                          (right.ideal_by_pixel.transpose() * line.head<2>()).squaredNorm() + kTiny;
+    return q.dot(line) / std::sqrt(square);
+  }
+
+  Term term(Sight const& left, Sight const& right) const {
+    Eigen::Matrix3d const& r = start.rotation;
+    Eigen::Vector3d const &t = start.translation, p = left.ideal.homogeneous(), q = right.ideal.homogeneous();
+    Eigen::Vector3d const turned = r * p, other = q.cross(t);
+    // Derivatives of the error q · (t × R p) by the two rays: the epipolar lines.
+    Eigen::Vector3d const line = t.cross(turned), line_left = r.transpose() * other;
+    Eigen::Vector2d const by_left = left.ideal_by_pixel.transpose() * line_left.head<2>();
+    Eigen::Vector2d const by_right = right.ideal_by_pixel.transpose() * line.head<2>();
+    double const error = q.dot(line), square = by_left.squaredNorm() + by_right.squaredNorm() + kTiny;
+    double const length = std::sqrt(square);
+    Term term;
+    term.residual = error / length;
+    auto const set = [&](int k, double error_change, Eigen::Vector3d const& line_change,
+                         Eigen::Vector3d const& line_left_change) {
+      double const square_change = 2 * by_left.dot(left.ideal_by_pixel.transpose() * line_left_change.head<2>()) +
+                                   2 * by_right.dot(right.ideal_by_pixel.transpose() * line_change.head<2>());
+      term.derivative[k] = (error_change - 0.5 * error * square_change / square) / length;
+    };
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d const axis = Eigen::Vector3d::Unit(k), moved = axis.cross(turned);
+      set(k, other.dot(moved), t.cross(moved), r.transpose() * other.cross(axis));
+    }
+    for (int k = 0; k < 2; ++k) {
+      Eigen::Vector3d const direction = start.tangent.col(k), moved = direction.cross(turned);
+      set(3 + k, q.dot(moved), moved, r.transpose() * q.cross(direction));
+    }
+    if (!intrinsics) return term;
+    auto const set_rays = [&](int k, Eigen::Vector2d const& left_change, Eigen::Vector2d const& right_change) {
+      Eigen::Vector3d const dp(left_change.x(), left_change.y(), 0), dq(right_change.x(), right_change.y(), 0);
+      set(k, line_left.dot(dp) + line.dot(dq), t.cross(r * dp), r.transpose() * dq.cross(t));
+    };
+    set_rays(kFocal, left.ideal_by_focal, right.ideal_by_focal);
+    set_rays(kK1, left.ideal_by_k1, right.ideal_by_k1);
+    return term;
   }
 };
 
-using CostFunction = ceres::AutoDiffCostFunction<EpipolarCost, 1, kUnknowns>;
+struct Sights {
+  Sight left, right;
+};
+
+std::vector<Sights> sights_of(std::vector<Correspondence> const& matches, StereoRig const& rig) {
+  std::vector<Sights> sights;
+  sights.reserve(matches.size());
+  for (Correspondence const& match : matches)
+    sights.push_back({Sight(rig.left, match.left), Sight(rig.right, match.right)});
+  return sights;
+}
+
+struct CauchyLoss {
+  double scale2;  // 0: squares
+  double cost(double square) const { return scale2 > 0 ? scale2 * std::log1p(square / scale2) : square; }
+  double weight(double square) const { return scale2 > 0 ? 1 / (1 + square / scale2) : 1; }
+};
 
 Camera with_focal_factor(Camera const& c, double factor) {
   return Camera::perspective(c.width(), c.height(), c.fx() * factor, c.fy() * factor, c.cx(), c.cy());
@@ -138,16 +160,15 @@ PoseStart pose_start(StereoRig const& rig) {
   return {rig.right_from_left.linear(), t, tangent_plane(t)};
 }
 
-std::vector<std::unique_ptr<CostFunction>> make_costs(std::vector<Correspondence> const& matches, StereoRig const& rig,
-                                                      PoseStart const& start, EpipolarFitOptions const& options) {
-  std::vector<std::unique_ptr<CostFunction>> costs;
-  costs.reserve(matches.size());
-  for (Correspondence const& match : matches) {
-    auto* const cost = new EpipolarCost{Sight(rig.left, match.left), Sight(rig.right, match.right), &start,
-                                        1.0 / static_cast<double>(match.sigma_px), options.focal || options.k1};
-    costs.push_back(std::make_unique<CostFunction>(cost));
-  }
-  return costs;
+double total_cost(std::vector<Correspondence> const& matches, std::vector<Sights> const& sights, StereoRig const& rig,
+                  CauchyLoss const& loss) {
+  PoseStart const start = pose_start(rig);
+  Epipolar const epipolar{start, false};
+  double sum = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    sum += loss.cost(
+        std::pow(epipolar.residual(sights[i].left, sights[i].right) / static_cast<double>(matches[i].sigma_px), 2));
+  return sum;
 }
 
 std::vector<int> held_unknowns(EpipolarFitOptions const& options) {
@@ -166,29 +187,28 @@ std::size_t cluster(Camera const& camera, Eigen::Vector2d const& pixel) {
 }
 
 // Information matrix, gradient by cluster and residuals at the optimum (the loss' weights included).
-void finish(std::vector<Correspondence> const& matches, std::vector<std::unique_ptr<CostFunction>> const& costs,
-            EpipolarFitOptions const& options, PoseStart const& start, EpipolarFit& fit) {
-  Vector7d const zero = Vector7d::Zero();
+void finish(std::vector<Correspondence> const& matches, std::vector<Sights> const& sights,
+            EpipolarFitOptions const& options, EpipolarFit& fit) {
+  PoseStart const start = pose_start(fit.rig);
+  Epipolar const epipolar{start, options.focal || options.k1};
   Matrix7d information = Matrix7d::Zero();
   std::array<Vector7d, kClusterColumns * kClusterRows> gradients;
   gradients.fill(Vector7d::Zero());
-  double const scale2 = options.cauchy_sigmas * options.cauchy_sigmas;
+  CauchyLoss const loss{options.cauchy_sigmas * options.cauchy_sigmas};
   double weighted = 0, weights = 0;
   fit.mean_square = fit.cost = 0;
-  for (std::size_t i = 0; i < costs.size(); ++i) {
-    double residual = 0;
-    Vector7d derivative;
-    double const* const at = zero.data();
-    double* jacobian = derivative.data();
-    costs[i]->Evaluate(&at, &residual, &jacobian);
-    double const square = residual * residual;
-    double const weight = scale2 > 0 ? 1 / (1 + square / scale2) : 1;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    Term term = epipolar.term(sights[i].left, sights[i].right);
+    term.residual /= static_cast<double>(matches[i].sigma_px);
+    term.derivative /= static_cast<double>(matches[i].sigma_px);
+    double const square = term.residual * term.residual;
+    double const weight = loss.weight(square);
     fit.mean_square += square;
-    fit.cost += scale2 > 0 ? scale2 * std::log1p(square / scale2) : square;
+    fit.cost += loss.cost(square);
     weighted += weight * square;
     weights += weight;
-    information += weight * derivative * derivative.transpose();
-    gradients[cluster(fit.rig.left.camera, matches[i].left)] += weight * residual * derivative;
+    information += weight * term.derivative * term.derivative.transpose();
+    gradients[cluster(fit.rig.left.camera, matches[i].left)] += weight * term.residual * term.derivative;
   }
   auto const count = static_cast<double>(matches.size());
   for (int const k : held_unknowns(options)) {
@@ -257,43 +277,66 @@ EpipolarResidual epipolar_residual(StereoRig const& rig, Eigen::Vector2d const& 
 
 EpipolarFit fit_epipolar(std::vector<Correspondence> const& matches, StereoRig const& start_rig,
                          EpipolarFitOptions const& options) {
-  constexpr int kRounds = 6;
+  constexpr int kMostSteps = 60;
+  constexpr double kConverged = 1e-12;  // relative gain of the cost
   EpipolarFit fit;
   fit.rig = start_rig;
   fit.rig.unit = "arbitrary";
   fit.rig.right_from_left.translation().normalize();
-  fit.usable = true;
-  double log_focal = 0;
-  std::unique_ptr<ceres::LossFunction> const loss(
-      options.cauchy_sigmas > 0 ? new ceres::CauchyLoss(options.cauchy_sigmas) : nullptr);
-  for (int round = 0; round < kRounds; ++round) {
+  CauchyLoss const loss{options.cauchy_sigmas * options.cauchy_sigmas};
+  bool const intrinsics = options.focal || options.k1;
+  double const start_focal = start_rig.left.camera.fx();
+  auto const held = held_unknowns(options);
+  std::vector<Sights> sights = sights_of(matches, fit.rig);
+  double damping = 1e-4;
+  double cost = total_cost(matches, sights, fit.rig, loss);
+  fit.usable = std::isfinite(cost);
+  for (int step = 0; step < kMostSteps && fit.usable; ++step) {
     PoseStart const start = pose_start(fit.rig);
-    auto const costs = make_costs(matches, fit.rig, start, options);
-    ceres::Problem::Options ownership;
-    ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    ownership.disable_all_safety_checks = true;
-    ceres::Problem problem(ownership);
-    Vector7d x = Vector7d::Zero();
-    for (auto const& cost : costs) problem.AddResidualBlock(cost.get(), loss.get(), x.data());
-    if (auto const held = held_unknowns(options); !held.empty())
-      problem.SetManifold(x.data(), new ceres::SubsetManifold(kUnknowns, held));
-    ceres::Solver::Options solver;
-    solver.num_threads = 1;
-    solver.logging_type = ceres::SILENT;
-    solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-    solver.max_num_iterations = 50;
-    solver.function_tolerance = 1e-10;
-    ceres::Solver::Summary summary;
-    ceres::Solve(solver, &problem, &summary);
-    log_focal += x[kFocal];
-    fit.usable = x.allFinite() && std::abs(log_focal) < options.largest_step && summary.IsSolutionUsable();
-    if (!fit.usable) return fit;
-    apply(x, start, fit.rig);
-    if (x.head<6>().norm() < 1e-7 && std::abs(x[kK1]) < 1e-6) break;
+    Epipolar const epipolar{start, intrinsics};
+    Matrix7d information = Matrix7d::Zero();
+    Vector7d gradient = Vector7d::Zero();
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      Term const term = epipolar.term(sights[i].left, sights[i].right);
+      double const precision = 1 / std::pow(static_cast<double>(matches[i].sigma_px), 2);
+      double const weight = precision * loss.weight(precision * term.residual * term.residual);
+      information += weight * term.derivative * term.derivative.transpose();
+      gradient += weight * term.residual * term.derivative;
+    }
+    for (int const k : held) {
+      information.row(k).setZero();
+      information.col(k).setZero();
+      information(k, k) = 1;
+      gradient[k] = 0;
+    }
+    bool gained = false, ended = false;
+    // Levenberg-Marquardt: damped more until the cost falls.
+    for (int attempt = 0; attempt < 12 && !gained && !ended; ++attempt) {
+      Matrix7d damped = information;
+      damped.diagonal() *= 1 + damping;
+      Vector7d const x = -damped.inverse() * gradient;
+      StereoRig moved = fit.rig;
+      if (x.allFinite() && x.norm() < 1) apply(x, start, moved);
+      double const moved_cost = [&] {
+        if (!x.allFinite() || x.norm() >= 1) return std::numeric_limits<double>::infinity();
+        return total_cost(matches, intrinsics ? sights_of(matches, moved) : sights, moved, loss);
+      }();
+      if (moved_cost <= cost) {
+        gained = true;
+        ended = cost - moved_cost <= kConverged * cost;
+        fit.rig = moved;
+        cost = moved_cost;
+        damping = std::max(1e-9, 0.1 * damping);
+        if (intrinsics) sights = sights_of(matches, fit.rig);
+      } else {
+        damping = std::max(1e-6, 10 * damping);
+      }
+    }
+    fit.usable = std::abs(std::log(fit.rig.left.camera.fx() / start_focal)) < options.largest_step;
+    if (!gained || ended) break;
   }
-  PoseStart const start = pose_start(fit.rig);
-  finish(matches, make_costs(matches, fit.rig, start, options), options, start, fit);
+  if (!fit.usable) return fit;
+  finish(matches, sights, options, fit);
   return fit;
 }
 
