@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "base/srgb.h"
+#include "synth/interreflection.h"
 #include "synth/linear_color.h"
 
 namespace scanview {
@@ -131,6 +132,16 @@ CapturePictures CaptureRig::take(int view, CaptureSide side, Context& context) c
   return pictures;
 }
 
+void CaptureRig::bounce(int view, SceneSamples const& samples, std::array<Vector3d, kPacket> const& directions,
+                        CounterRandom const& random, float* frames) const {
+  auto const first = std::find_if(samples.begin(), samples.end(), [](SceneSample const& s) { return s.is_object; });
+  if (first == samples.end()) return;
+  auto const count = std::count_if(first, samples.end(), [](SceneSample const& s) { return s.is_object; });
+  double const weight = exposure_ * options_.scene.interreflection * static_cast<double>(count) / kPacket;
+  add_interreflection(scene_, view, *first, directions[static_cast<std::size_t>(first - samples.begin())], light_,
+                      static_cast<float>(options_.scene.gloss), static_cast<float>(weight), random, frames);
+}
+
 void CaptureRig::take_row(int view, CaptureSide side, int y, CapturePictures& pictures) const {
   int const width = options_.width, frames = light_.frames();
   Isometry3d const pose = room_from_camera(side);
@@ -141,6 +152,11 @@ void CaptureRig::take_row(int view, CaptureSide side, int y, CapturePictures& pi
   std::vector<float> light(static_cast<std::size_t>(frames + 1) * size), pixel(static_cast<std::size_t>(frames + 1));
   std::vector<Vector3f> color(size);
   std::array<Vector3d, kPacket> directions;
+  auto const stream = [&](int frame) {
+    return CounterRandom(seed_, picture_key(view, side),
+                         static_cast<std::uint64_t>(frame) * static_cast<std::uint64_t>(options_.height) +
+                             static_cast<std::uint64_t>(y));
+  };
   auto const per_sample = static_cast<float>(exposure_ / kPacket);
   for (int x = 0; x < width; ++x) {
     for (int i = 0; i < kPacket; ++i) {
@@ -157,17 +173,15 @@ void CaptureRig::take_row(int view, CaptureSide side, int y, CapturePictures& pi
       if (sample.weight + sample.gloss > 0)
         light_.add(sample.light, per_sample * (sample.weight + sample.gloss), pixel.data());
     }
+    if (options_.scene.interreflection > 0)
+      bounce(view, samples, directions,
+             CounterRandom(seed_ + 1, picture_key(view, side), static_cast<std::uint64_t>(y) * size + x), pixel.data());
     color[x] = room;
     auto const always = static_cast<float>(exposure_ * options_.scene.ambient) * luminance(room);
     for (int k = 0; k <= frames; ++k) light[static_cast<std::size_t>(k) * size + x] = pixel[k] + always;
   }
   auto const order = frame_order(options_.faults, frames,
                                  side == CaptureSide::left ? CaptureFaults::Side::left : CaptureFaults::Side::right);
-  auto const stream = [&](int frame) {
-    return CounterRandom(seed_, picture_key(view, side),
-                         static_cast<std::uint64_t>(frame) * static_cast<std::uint64_t>(options_.height) +
-                             static_cast<std::uint64_t>(y));
-  };
   for (int file = 0; file < frames; ++file)
     sensor_.expose(light.data() + static_cast<std::size_t>(order[file]) * size, width, stream(order[file]),
                    pictures.frames[file].ptr(y));

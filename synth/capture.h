@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "base/context.h"
+#include "base/random.h"
 #include "mesh/triangle_mesh.h"
 #include "synth/capture_layout.h"
 #include "synth/capture_options.h"
@@ -55,6 +56,9 @@ class CaptureRig {
 
  private:
   double find_exposure(Context& context) const;
+  /// Light by way of one other surface, once a pixel: it varies little within one.
+  void bounce(int view, SceneSamples const& samples, std::array<Eigen::Vector3d, kPacket> const& directions,
+              CounterRandom const& random, float* frames) const;
   void take_row(int view, CaptureSide side, int y, CapturePictures& pictures) const;
   CaptureOptions options_;
   CenteredModel centered_;

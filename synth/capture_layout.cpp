@@ -89,21 +89,31 @@ void place_cameras(CaptureLayout& layout, double distance, double radius, double
   layout.room_from_light = look_at(at + 1.08 * distance * direction(kLampAzimuth, kLampElevation), at);
 }
 
-/// How much of a picture the object needs: 1 where it touches the border.
-double fill(CaptureLayout const& layout, std::vector<Vector3d> const& room_points) {
-  double most = 0;
+/// Where a set of points lies in both pictures, as shares of half the picture from its centre.
+struct Extent {
+  double most = 0;                   ///< of all four sides: 1 where a point touches the border
+  double above = 1e9, below = -1e9;  ///< the highest and lowest point
+};
+
+Extent extent(CaptureLayout const& layout, std::vector<Vector3d> const& room_points) {
+  Extent result;
   Isometry3d const left_from_room = layout.room_from_left.inverse();
   Isometry3d const right_from_room = layout.rig.right_from_left * left_from_room;
   for (auto const& p : room_points)
     for (auto const& [camera, pose] :
          {std::pair{&layout.rig.left.camera, &left_from_room}, std::pair{&layout.rig.right.camera, &right_from_room}}) {
       Vector3d const q = *pose * p;
-      if (q.z() <= 0) return std::numeric_limits<double>::infinity();
+      if (q.z() <= 0) {
+        result.most = std::numeric_limits<double>::infinity();
+        return result;
+      }
       Eigen::Vector2d const pixel = camera->project(q);
-      most = std::max({most, std::abs(pixel.x() - 0.5 * (camera->width() - 1)) / (0.5 * camera->width()),
-                       std::abs(pixel.y() - 0.5 * (camera->height() - 1)) / (0.5 * camera->height())});
+      double const across = (pixel.x() - 0.5 * (camera->width() - 1)) / (0.5 * camera->width());
+      double const down = (pixel.y() - 0.5 * (camera->height() - 1)) / (0.5 * camera->height());
+      result.most = std::max({result.most, std::abs(across), std::abs(down)});
+      result.above = std::min(result.above, down), result.below = std::max(result.below, down);
     }
-  return most;
+  return result;
 }
 
 StereoRig cameras(CaptureOptions const& options) {
@@ -135,13 +145,19 @@ CaptureLayout make_layout(CenteredModel const& model, CaptureOptions const& opti
     }
   layout.target = Vector3d(0, box.center().y(), 0);
   layout.rig = cameras(options);
-  double near = 1.5 * model.radius, far = 200 * model.radius;
-  for (int step = 0; step < 60; ++step) {
-    double const middle = 0.5 * (near + far);
-    place_cameras(layout, middle, model.radius, options.baseline_deg);
-    (fill(layout, points) > kFill ? near : far) = middle;
+  // As near as the picture allows; then look higher or lower, so that it allows more.
+  for (int round = 0; round < 4; ++round) {
+    double near = 1.5 * model.radius, far = 200 * model.radius;
+    for (int step = 0; step < 60; ++step) {
+      double const middle = 0.5 * (near + far);
+      place_cameras(layout, middle, model.radius, options.baseline_deg);
+      (extent(layout, points).most > kFill ? near : far) = middle;
+    }
+    place_cameras(layout, far, model.radius, options.baseline_deg);
+    Extent const seen = extent(layout, points);
+    if (round < 3)
+      layout.target.y() -= 0.5 * (seen.above + seen.below) * 0.5 * options.height / layout.rig.left.camera.fy() * far;
   }
-  place_cameras(layout, far, model.radius, options.baseline_deg);
 
   layout.rig_in_use = layout.rig;
   layout.rig_in_use.right_from_left =

@@ -53,6 +53,8 @@ CaptureScene::CaptureScene(TriangleMesh const& model, CenteredModel const& cente
       lamp_distance_(layout.lamp_distance()) {
   for (auto const& pose : layout.room_from_object)
     model_from_room_.push_back((pose * Eigen::Translation3d(centered.center)).inverse());
+  if (stage_)
+    for (auto const& pose : model_from_room_) contact_.emplace_back(object_, pose, layout.disc_radius);
   for (int t = 0; t < static_cast<int>(model.triangles.size()); ++t) {
     Vector3f const normal = face_normal(t);
     surface_.mark_seen(t, normal);
@@ -84,7 +86,7 @@ bool CaptureScene::is_open_to(int view, ObjectPoint const& point, Vector3d const
   Vector3d const way = place - point.point;
   if (!(point.normal.dot(way) > 0)) return false;
   Isometry3d const& to_model = model_from_room_[view];
-  double const off = kOffSurface * centered_.radius;
+  double const off = off_surface();
   std::array<Vector3f, kPacket> origins;
   RayDirections directions;
   origins.fill(Vector3f::Zero());
@@ -94,31 +96,31 @@ bool CaptureScene::is_open_to(int view, ObjectPoint const& point, Vector3d const
   return !object_.occluded(origins, directions, 1, 0.5f * static_cast<float>(off))[0];
 }
 
-std::array<bool, kPacket> CaptureScene::in_shadow(int view, std::array<Surface, kPacket> const& surfaces,
-                                                  std::array<bool, kPacket> const& asked) const {
-  std::array<bool, kPacket> shadow{};
+double CaptureScene::off_surface() const { return kOffSurface * centered_.radius; }
+
+void CaptureScene::cast_shadows(int view, SceneSamples& samples) const {
   std::array<Vector3f, kPacket> origins;
   RayDirections directions;
   origins.fill(Vector3f::Zero());
   directions.fill(Vector3f::UnitY());
   std::array<int, kPacket> index;
-  double const off = kOffSurface * centered_.radius;
+  double const off = off_surface();
   auto const cast = [&](RayScene const& scene, Isometry3d const& from_room) {
     int count = 0;
     for (int i = 0; i < kPacket; ++i) {
-      if (!asked[i] || shadow[i]) continue;
-      Vector3d const way = (lamp_ - surfaces[i].point).normalized();
-      origins[count] = (from_room * (surfaces[i].point + off * surfaces[i].normal)).cast<float>();
+      if (!(samples[i].weight + samples[i].gloss > 0)) continue;
+      Vector3d const way = (lamp_ - samples[i].point).normalized();
+      origins[count] = (from_room * (samples[i].point + off * samples[i].normal)).cast<float>();
       directions[count] = (from_room.linear() * way).cast<float>();
       index[count++] = i;
     }
     if (count == 0) return;
     auto const blocked = scene.occluded(origins, directions, count, 0.5f * static_cast<float>(off));
-    for (int k = 0; k < count; ++k) shadow[index[k]] = blocked[k];
+    for (int k = 0; k < count; ++k)
+      if (blocked[k]) samples[index[k]].weight = samples[index[k]].gloss = 0;
   };
   if (view >= 0) cast(object_, model_from_room_[view]);
   if (stage_) cast(*stage_, Isometry3d::Identity());
-  return shadow;
 }
 
 SceneSamples CaptureScene::look(int view, Vector3d const& eye, std::array<Vector3d, kPacket> const& directions,
@@ -139,45 +141,36 @@ SceneSamples CaptureScene::look(int view, Vector3d const& eye, std::array<Vector
   }
 
   SceneSamples samples;
-  std::array<Surface, kPacket> surfaces;
-  std::array<bool, kPacket> faces_lamp{};
   for (int i = 0; i < kPacket; ++i) {
     SceneSample& sample = samples[i];
     sample.is_object = object_hits[i].triangle >= 0;
-    Surface& surface = surfaces[i];
-    if (sample.is_object) {
-      surface.point = eye + static_cast<double>(object_hits[i].distance) * directions[i];
-      surface.normal =
-          model_from_room_[view].linear().transpose() * face_normal(object_hits[i].triangle).cast<double>();
-      if (surface.normal.dot(directions[i]) > 0) surface.normal = -surface.normal;
-      look_at_object(sample, object_hits[i], surface, directions[i], view);
-    } else if (stage_hits[i].triangle >= 0) {
-      surface.point = eye + static_cast<double>(stage_hits[i].distance) * directions[i];
-      surface.normal = stage_hits[i].triangle < kDiscSides ? Vector3d::UnitY() : Vector3d::UnitZ();
-      if (surface.normal.dot(directions[i]) > 0) surface.normal = -surface.normal;
-      look_at_stage(sample, surface);
-    }
-    faces_lamp[i] = sample.weight + sample.gloss > 0;
-    if (faces_lamp[i]) sample.light = light.at(surface.point);
+    RayHit const& hit = sample.is_object ? object_hits[i] : stage_hits[i];
+    if (hit.triangle < 0) continue;
+    sample.point = eye + static_cast<double>(hit.distance) * directions[i];
+    if (sample.is_object)
+      look_at_object(sample, hit, directions[i], view);
+    else
+      look_at_stage(sample, hit, directions[i], view);
+    if (sample.weight + sample.gloss > 0) sample.light = light.at(sample.point);
   }
-  auto const shadow = in_shadow(view, surfaces, faces_lamp);
-  for (int i = 0; i < kPacket; ++i)
-    if (shadow[i]) samples[i].weight = samples[i].gloss = 0;
+  cast_shadows(view, samples);
   return samples;
 }
 
-void CaptureScene::look_at_object(SceneSample& sample, RayHit const& hit, Surface const& surface,
-                                  Vector3d const& direction, int view) const {
+void CaptureScene::look_at_object(SceneSample& sample, RayHit const& hit, Vector3d const& direction, int view) const {
   Eigen::Matrix3d const& to_model = model_from_room_[view].linear();
   Vector3f const along = (to_model * direction).cast<float>();
+  sample.normal = to_model.transpose() * face_normal(hit.triangle).cast<double>();
+  if (sample.normal.dot(direction) > 0) sample.normal = -sample.normal;
+  sample.albedo = luminance(surface_.albedo(hit));
   sample.room = surface_.leaving(hit, along);
-  Vector3d const to_lamp = lamp_ - surface.point;
-  if (surface.normal.dot(to_lamp) <= 0) return;
+  Vector3d const to_lamp = lamp_ - sample.point;
+  if (sample.normal.dot(to_lamp) <= 0) return;
   Vector3d const normal = to_model.transpose() * surface_.normal(hit, along).cast<double>();
   double const distance = to_lamp.norm(), cosine = normal.dot(to_lamp) / distance;
   if (cosine <= 0) return;
   double const arriving = cosine * lamp_distance_ / distance;
-  sample.weight = static_cast<float>(luminance(surface_.albedo(hit)) * arriving);
+  sample.weight = static_cast<float>(sample.albedo * arriving);
   if (options_.gloss > 0) {
     Vector3d const half = (to_lamp / distance - direction.normalized()).normalized();
     double const m = options_.gloss_exponent;
@@ -186,11 +179,16 @@ void CaptureScene::look_at_object(SceneSample& sample, RayHit const& hit, Surfac
   }
 }
 
-void CaptureScene::look_at_stage(SceneSample& sample, Surface const& surface) const {
-  sample.room = paint_ * (surface.normal.y() > 0.5 ? kDiscLight : kBackdropLight);
-  Vector3d const to_lamp = lamp_ - surface.point;
-  double const distance = to_lamp.norm(), cosine = surface.normal.dot(to_lamp) / distance;
-  if (cosine > 0) sample.weight = static_cast<float>(luminance(paint_) * cosine * lamp_distance_ / distance);
+void CaptureScene::look_at_stage(SceneSample& sample, RayHit const& hit, Vector3d const& direction, int view) const {
+  bool const is_disc = hit.triangle < kDiscSides;
+  sample.normal = is_disc ? Vector3d::UnitY() : Vector3d::UnitZ();
+  if (sample.normal.dot(direction) > 0) sample.normal = -sample.normal;
+  sample.albedo = luminance(paint_);
+  sample.room = paint_ * (is_disc ? kDiscLight : kBackdropLight);
+  if (is_disc && view >= 0) sample.room *= contact_[view].at(sample.point.x(), sample.point.z());
+  Vector3d const to_lamp = lamp_ - sample.point;
+  double const distance = to_lamp.norm(), cosine = sample.normal.dot(to_lamp) / distance;
+  if (cosine > 0) sample.weight = static_cast<float>(sample.albedo * cosine * lamp_distance_ / distance);
 }
 
 }  // namespace scanview

@@ -8,6 +8,7 @@
 #include "base/context.h"
 #include "mesh/triangle_mesh.h"
 #include "synth/capture_layout.h"
+#include "synth/contact_shade.h"
 #include "synth/projected_light.h"
 #include "synth/ray_scene.h"
 #include "synth/surface_light.h"
@@ -19,9 +20,12 @@ namespace scanview {
 struct SceneSample {
   bool is_object = false;
   LightPoint light;
-  float weight = 0;                                ///< diffuse
-  float gloss = 0;                                 ///< the glossy lobe's, on the same scale
-  Eigen::Vector3f room = Eigen::Vector3f::Zero();  ///< with the room's lights on, linear R G B
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();   ///< room
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< of the triangle, unit, towards the eye; zero: nothing was met
+  float albedo = 0;                                  ///< luminance of the diffuse reflectance
+  float weight = 0;                                  ///< diffuse
+  float gloss = 0;                                   ///< the glossy lobe's, on the same scale
+  Eigen::Vector3f room = Eigen::Vector3f::Zero();    ///< with the room's lights on, linear R G B
 };
 using SceneSamples = std::array<SceneSample, kPacket>;
 
@@ -47,17 +51,15 @@ class CaptureScene {
   /// Whether the triangle faces a place and nothing of the object is between.
   bool is_open_to(int view, ObjectPoint const& point, Eigen::Vector3d const& place) const;
 
+  /// How far from a surface rays start that must not meet it again, mm.
+  double off_surface() const;
+
  private:
   Eigen::Vector3f face_normal(int triangle) const;
-  struct Surface {
-    Eigen::Vector3d point, normal;  // room; of the triangle, unit, towards the eye
-  };
-  void look_at_object(SceneSample& sample, RayHit const& hit, Surface const& surface, Eigen::Vector3d const& direction,
-                      int view) const;
-  void look_at_stage(SceneSample& sample, Surface const& surface) const;
-  /// Lit, each: what is between the points and the lamp.
-  std::array<bool, kPacket> in_shadow(int view, std::array<Surface, kPacket> const& surfaces,
-                                      std::array<bool, kPacket> const& is_object) const;
+  void look_at_object(SceneSample& sample, RayHit const& hit, Eigen::Vector3d const& direction, int view) const;
+  void look_at_stage(SceneSample& sample, RayHit const& hit, Eigen::Vector3d const& direction, int view) const;
+  /// Takes the lamp's light from what lies in its shadow.
+  void cast_shadows(int view, SceneSamples& samples) const;
   TriangleMesh const& model_;
   CenteredModel const& centered_;
   CaptureLayout const& layout_;
@@ -69,6 +71,7 @@ class CaptureScene {
   Eigen::Vector3d lamp_;
   double lamp_distance_ = 1;
   std::vector<Eigen::Isometry3d> model_from_room_;  // of each view, about the model's centre
+  std::vector<ContactShade> contact_;               // of each view, where there is a stage
 };
 
 }  // namespace scanview
