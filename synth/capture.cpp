@@ -24,6 +24,8 @@ constexpr int kMeterSpacing = 6;          // pixels between the rays that meter 
 constexpr double kMeterQuantile = 0.998;  // a few brighter points may clip
 constexpr float kNoDepth = std::numeric_limits<float>::quiet_NaN();
 
+constexpr std::uint64_t kBounceItem = std::uint64_t{1} << 40;  // keys the directions of interreflection
+
 /// Key of a picture's random numbers.
 std::uint64_t picture_key(int view, CaptureSide side) {
   return 2 * static_cast<std::uint64_t>(view + 1) + static_cast<std::uint64_t>(side);
@@ -175,7 +177,8 @@ void CaptureRig::take_row(int view, CaptureSide side, int y, CapturePictures& pi
     }
     if (options_.scene.interreflection > 0)
       bounce(view, samples, directions,
-             CounterRandom(seed_ + 1, picture_key(view, side), static_cast<std::uint64_t>(y) * size + x), pixel.data());
+             CounterRandom(seed_, kBounceItem + picture_key(view, side), static_cast<std::uint64_t>(y) * size + x),
+             pixel.data());
     color[x] = room;
     auto const always = static_cast<float>(exposure_ * options_.scene.ambient) * luminance(room);
     for (int k = 0; k <= frames; ++k) light[static_cast<std::size_t>(k) * size + x] = pixel[k] + always;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "synth/interreflection.h"
 #include "tests/expect_error.h"
 #include "tests/synth/shapes.h"
 
@@ -234,7 +235,7 @@ TEST(Capture, TheLampStaysTheSameWhenItMakesMoreSteps) {
   EXPECT_NEAR(rig.light().beam_steps() * step * rig.layout().lamp_distance(), 1, 1e-9);
 }
 
-TEST(Capture, AmbientLightAndGlossAddToTheBeamAndExposureScalesBoth) {
+TEST(Capture, AmbientLightIsThereWhereTheBeamIsNotAndExposureScalesBoth) {
   TriangleMesh const square = make_square();
   Context context;
   CaptureOptions options = small_capture();
@@ -251,6 +252,35 @@ TEST(Capture, AmbientLightAndGlossAddToTheBeamAndExposureScalesBoth) {
   double const full = 65535 * 0.5 * kPeakShare;  // of beam and ambient together
   EXPECT_GT(brightest, 0.03 * full);
   EXPECT_LT(brightest, 0.2 * full);
+}
+
+TEST(Capture, ASurfaceSquareToAnotherGetsHalfOfWhatThatOneSendsBack) {
+  // Two squares that meet at right angles in a vertical edge and open towards the lamp.
+  TriangleMesh groove;
+  groove.vertices = {{0, -200, 0}, {0, 200, 0}, {283, -200, 283}, {283, 200, 283}, {-283, -200, 283}, {-283, 200, 283}};
+  groove.triangles = {{0, 3, 1}, {0, 2, 3}, {0, 1, 5}, {0, 5, 4}};
+  groove.colors.assign(6, cv::Vec3b(188, 188, 188));  // sends back half of the light (sRGB)
+  CaptureOptions options = small_capture();
+  options.width = 32, options.height = 24;
+  Context context;
+  CaptureRig const rig(groove, options, context);
+  Vector3d const eye = rig.layout().room_from_light.translation();
+  // A point 2 from the edge and in the middle of its height: the other square fills half of what it sees, weighted by
+  // the cosine (but for the square's ends: 2 / 400).
+  Vector3d const aim = rig.layout().room_from_object[0] * Vector3d(1.4, 0, 1.4);
+  std::array<Vector3d, kPacket> directions;
+  directions.fill(aim - eye);
+  SceneSample const point = rig.scene().look(0, eye, directions, rig.light())[0];
+  ASSERT_TRUE(point.is_object);
+  EXPECT_NEAR(point.albedo, 0.5, 0.01);
+  std::vector<float> direct(48, 0.0f), bounced(48, 0.0f);
+  rig.light().add(point.light, point.weight, direct.data());
+  add_interreflection(rig.scene(), 0, point, directions[0], rig.light(), 0, 1, CounterRandom(1, 1), bounced.data());
+  double sum_direct = 0, sum_bounced = 0;
+  for (int k = 0; k < 48; ++k) sum_direct += direct[k], sum_bounced += bounced[k];
+  // Both squares are lit alike near the edge: the lamp stands 2 degrees off the middle (3.5 % each way), and what is
+  // up to its own distance nearer to the lamp counts as much more; 64 directions share out half a hemisphere to 3 %.
+  EXPECT_NEAR(sum_bounced / sum_direct, 0.5 * 0.5, 0.25 * 0.2);
 }
 
 TEST(Capture, SameBytesForAnyNumberOfThreads) {
