@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/parallel.h"
 
 namespace scanview {
@@ -21,12 +22,6 @@ constexpr int kFewest = 100;  // matched pixels in a window
 constexpr double kLeastCorrelation = 0.85;
 constexpr std::size_t kFewestPoints = 30;
 constexpr double kLeastContrast = 3.0 / 255;  // RMS change from row to row, of full scale
-
-double median(std::vector<double> values) {
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Place {
   double x = 0, y = 0, dy = 0;
@@ -169,8 +164,7 @@ RigShift measure_rig_shift(cv::Mat const& left, cv::Mat const& right, cv::Mat1f 
   std::vector<double> values;
   for (Place const& place : places) values.push_back(place.dy);
   result.median_px = median(values);
-  for (double& value : values) value = std::abs(value - result.median_px);
-  result.median_std_px = 1.2533 * 1.4826 * median(values) / std::sqrt(count);
+  result.median_std_px = 1.2533 * robust_deviation(std::move(values)) / std::sqrt(count);
 
   Eigen::Vector3d model(result.median_px, 0, 0);
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();

@@ -6,16 +6,10 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/median.h"
 
 namespace scanview {
 namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return SoundnessFigures::kNone;
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // The beam's width in light, from its width in values under the response value = light^(1 / gamma): the value's half
 // height is another height of the light.
@@ -111,10 +105,7 @@ ResponseFit fit_response(std::vector<PeakSample> const& peaks) {
   for (int step = 0; step < 40; ++step) (difference((low + high) / 2) > 0 ? low : high) = (low + high) / 2;
   ResponseFit fit;
   fit.gamma = (low + high) / 2;
-  auto values = logs(0, count, fit.gamma);
-  double const center = median(values);
-  for (double& value : values) value = std::abs(value - center);
-  double const scatter = 1.4826 * median(std::move(values));
+  double const scatter = robust_deviation(logs(0, count, fit.gamma));
   double const error = 1.2533 * scatter * std::sqrt(2.0 / static_cast<double>(third));
   double const slope_there =
       (difference(fit.gamma * 1.1) - difference(fit.gamma / 1.1)) / (fit.gamma * (1.1 - 1 / 1.1));

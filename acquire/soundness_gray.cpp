@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "acquire/soundness.h"
+#include "base/median.h"
 
 namespace scanview {
 namespace {
@@ -14,19 +15,6 @@ constexpr std::size_t kMostBlurred = 3000;  // samples a bit for the response
 constexpr std::size_t kFewestSamples = 200;
 constexpr double kWrongPair = 0.33;  // of lit pixels: a pair from two bits disagrees at half of them
 constexpr double kClear = 0.6;       // of lit pixels wholly bright or dark: wide stripes
-
-double median(std::vector<double> values) {
-  if (values.empty()) return SoundnessFigures::kNone;
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-double robust_scatter(std::vector<double> values) {
-  double const center = median(values);
-  for (double& value : values) value = std::abs(value - center);
-  return 1.4826 * median(std::move(values));
-}
 
 }  // namespace
 
@@ -217,7 +205,7 @@ SoundnessFigures GraySoundness::finish() {
                          (figures.gamma * (1.05 - 1 / 1.05));
     // Pixels along a line share what is wrong with their surface; a tenth of them counts as independent.
     double const error =
-        1.2533 * robust_scatter(excess(figures.gamma)) / std::sqrt(0.1 * static_cast<double>(blurred_.size()));
+        1.2533 * robust_deviation(excess(figures.gamma)) / std::sqrt(0.1 * static_cast<double>(blurred_.size()));
     figures.gamma_std = error / std::max(1e-9, std::abs(slope));
     if (auto text = response_warning(camera_, figures.gamma, figures.gamma_std); !text.empty())
       figures.warnings.push_back(std::move(text));

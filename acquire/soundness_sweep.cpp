@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "acquire/soundness.h"
+#include "base/median.h"
 
 namespace scanview {
 namespace {
@@ -12,21 +13,9 @@ constexpr std::size_t kDelay = 6;  // frames after which the beam has left a pix
 constexpr float kFullScale = 0.998F;
 constexpr double kLeastLit = 0.03;      // of full scale: a change that a beam makes
 constexpr double kLeastOverlap = 0.02;  // below, the frames are just far apart
+constexpr double kTailless = 0.65;      // steps: least width of a beam for the lamp's brightness
 constexpr double kUneven = 0.25;        // scatter of the steps beyond which they are called uneven
 constexpr std::size_t kWindow = 6;      // frames on each side that say what is usual
-
-double median(std::vector<double> values) {
-  if (values.empty()) return SoundnessFigures::kNone;
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-double robust_scatter(std::vector<double> values) {
-  double const center = median(values);
-  for (double& value : values) value = std::abs(value - center);
-  return 1.4826 * median(std::move(values));
-}
 
 // Standard deviation of a pixel from what changed between two frames: most pixels are not lit in either.
 double noise_between(std::vector<float> const& a, std::vector<float> const& b) {
@@ -160,15 +149,17 @@ SoundnessFigures SweepSoundness::finish() {
     if (std::isfinite(steps_[k].ambient)) ambients.push_back(steps_[k].ambient);
   }
   if (curvatures.size() >= 5 && median(curvatures) < 0) figures.beam_steps = 1 / std::sqrt(-median(curvatures));
-  if (ambients.size() >= 5) figures.ambient_scatter = robust_scatter(ambients);
+  if (ambients.size() >= 5) figures.ambient_scatter = robust_deviation(ambients);
   std::vector<double> deviations;
   for (std::size_t k = 2; k < figures.frames; ++k)
     if (double const expected = usual(curvature_at, k); std::isfinite(expected) && std::isfinite(curvature_at[k]))
       deviations.push_back(curvature_at[k] - expected);
   // Of gains g: log g[k-1] - 2 log g[k] + log g[k+1], six times a gain's variance.
-  if (deviations.size() >= 8) figures.flicker = robust_scatter(deviations) / std::sqrt(6.0);
+  // A narrow beam's neighbouring frames see its tails only, where light by way of other surfaces counts.
+  if (deviations.size() >= 8 && figures.beam_steps > kTailless)
+    figures.flicker = robust_deviation(deviations) / std::sqrt(6.0);
 
-  std::vector<double> known, relative(figures.frames, SoundnessFigures::kNone), scatter;
+  std::vector<double> known, scatter;
   for (double const value : one)
     if (std::isfinite(value)) known.push_back(value);
   double const typical = median(known);
@@ -199,6 +190,11 @@ SoundnessFigures SweepSoundness::finish() {
       explained[k] = explained[k + 1] = explained[k + 2] = true;
     }
   }
+  // A gap lies between the frames two apart, too: three steps instead of two, as far as such a distance can be told.
+  auto const wide_at = [&](std::size_t k) {
+    double const least = 1.25 * usual(two, k);
+    return k >= figures.frames || !std::isfinite(two[k]) || !(least < 0.95 * distance(0)) || two[k] > least;
+  };
   for (std::size_t k = 1; k < figures.frames; ++k) {
     double const expected = expected_step(k);
     bool const same = std::isfinite(one[k]) && one[k] < 0.3 * expected && known.size() >= 5;
@@ -206,13 +202,13 @@ SoundnessFigures SweepSoundness::finish() {
       figures.doubled.push_back(k);
     } else if (order_shows && !explained[k] && one[k] > 1.6 * expected) {
       // Where the beam only grazes something both frames around are weak, too: a gap shows among strong frames only.
-      if (energies[k] > 0.1 * median(energies) && energies[k - 1] > 0.1 * median(energies))
-        figures.missing.push_back(k);
+      bool const strong = std::min(energies[k], energies[k - 1]) > 0.1 * median(energies);
+      if (strong && wide_at(k) && wide_at(k + 1)) figures.missing.push_back(k);
     } else if (!explained[k] && std::isfinite(one[k]) && one[k] > 0) {
       scatter.push_back(one[k] / expected - 1);
     }
   }
-  if (scatter.size() >= 8) figures.step_scatter = robust_scatter(scatter);
+  if (scatter.size() >= 8) figures.step_scatter = robust_deviation(scatter);
   if (figures.step_scatter > kUneven) {
     // Steps of any length: what looks like a gap or a changed brightness follows from them.
     figures.missing.clear();
@@ -236,7 +232,7 @@ SoundnessFigures SweepSoundness::finish() {
                      list(figures.missing)));
   if (!figures.out_of_order.empty())
     warn(fmt::format("frame {} is out of order: the light goes back and forth", list(figures.out_of_order)));
-  if (figures.flicker > 0.03)
+  if (figures.flicker > 0.04)
     warn(
         fmt::format("the lamp's brightness varies by {:.0f} % from frame to frame: let it warm up, or expose for whole "
                     "periods of the mains",

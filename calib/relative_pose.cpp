@@ -10,6 +10,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "calib/essential_search.h"
@@ -23,13 +24,6 @@ constexpr double kInlierSigmas = 3.5;
 // Two poses are told apart where their mean squares differ by this share: neighbouring matches share errors, so that
 // the number of matches says little about significance.
 constexpr double kVisiblyWorse = 1.02;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double focal(LensCamera const& camera) { return std::sqrt(camera.camera.fx() * camera.camera.fy()); }
 
