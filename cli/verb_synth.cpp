@@ -10,6 +10,7 @@
 #include "cli/report.h"
 #include "cli/stages.h"
 #include "mesh/triangle_mesh.h"
+#include "synth/capture_files.h"
 #include "synth/scanner.h"
 
 namespace scanview {
@@ -17,11 +18,29 @@ namespace fs = std::filesystem;
 namespace {
 
 struct Arguments {
-  std::string model, size = "640x480", layout = "sphere", disturb;
+  std::string model, pattern = "sweep", size = "640x480", noise;
+  int views = 12;
   fs::path output;
-  SynthOptions options;
   bool force = false;
+  // range
+  std::string layout = "sphere", disturb;
+  SynthOptions range;
+  // sweep, gray
+  std::string beam, projector = "1024x768";
+  std::vector<std::string> faults;
+  bool no_stage = false;
+  CaptureOptions capture;
 };
+
+/// Numbers between separators, as many as the format has; throws Error{usage} naming the option.
+template <class... Numbers>
+void scan(std::string const& option, std::string const& text, char const* format, char const* expected,
+          Numbers*... numbers) {
+  int end = 0;
+  int const read = std::sscanf(text.c_str(), (std::string(format).append("%n")).c_str(), numbers..., &end);
+  if (read != static_cast<int>(sizeof...(numbers)) || end != static_cast<int>(text.size()))
+    throw Error(ErrorCode::usage, {}, fmt::format("{} {}: expected {}", option, text, expected));
+}
 
 TriangleMesh load_model(std::string const& model) {
   auto const names = builtin_model_names();
@@ -29,24 +48,73 @@ TriangleMesh load_model(std::string const& model) {
   return read_triangle_mesh(model);
 }
 
-SynthOptions resolve(Arguments const& arguments) {
-  SynthOptions options = arguments.options;
-  char end = 0;
-  if (std::sscanf(arguments.size.c_str(), "%dx%d%c", &options.width, &options.height, &end) != 2)
-    throw Error(ErrorCode::usage, {}, fmt::format("--size {}: expected WIDTHxHEIGHT", arguments.size));
+SynthOptions range_options(Arguments const& arguments) {
+  SynthOptions options = arguments.range;
+  options.views = arguments.views;
+  scan("--size", arguments.size, "%dx%d", "WIDTHxHEIGHT", &options.width, &options.height);
+  if (!arguments.noise.empty())
+    scan("--noise", arguments.noise, "%lf", "a share of the radius", &options.noise.depth_sigma);
   options.layout = arguments.layout == "circle" ? SynthOptions::Layout::circle : SynthOptions::Layout::sphere;
   if (!arguments.disturb.empty()) {
     double percent = 0;
-    if (std::sscanf(arguments.disturb.c_str(), "%lf:%lf%c", &options.disturb_deg, &percent, &end) != 2)
-      throw Error(ErrorCode::usage, {}, fmt::format("--disturb {}: expected DEGREES:PERCENT", arguments.disturb));
+    scan("--disturb", arguments.disturb, "%lf:%lf", "DEGREES:PERCENT", &options.disturb_deg, &percent);
     options.disturb_share = percent / 100;
   }
   options.validate();
   return options;
 }
 
+void apply_fault(std::string const& text, CaptureFaults& faults) {
+  auto const colon = text.find(':');
+  std::string const kind = text.substr(0, colon), rest = colon == std::string::npos ? "" : text.substr(colon + 1);
+  auto const number = [&](double& value) { scan("--fault", rest, "%lf", "KIND:NUMBER", &value); };
+  if (kind == "drop" || kind == "repeat" || kind == "swap") {
+    auto const side = rest.find(':');
+    scan("--fault", rest.substr(0, side), "%d", "KIND:FRAME[:left|:right]",
+         kind == "drop"     ? &faults.drop
+         : kind == "repeat" ? &faults.repeat
+                            : &faults.swap);
+    std::string const name = side == std::string::npos ? "" : rest.substr(side + 1);
+    if (name != "" && name != "left" && name != "right")
+      throw Error(ErrorCode::usage, {}, fmt::format("--fault {}: '{}' is neither left nor right", text, name));
+    if (name != "") faults.side = name == "left" ? CaptureFaults::Side::left : CaptureFaults::Side::right;
+  } else if (kind == "flicker") {
+    number(faults.flicker);
+  } else if (kind == "jitter") {
+    number(faults.jitter);
+  } else if (kind == "moved") {
+    number(faults.rig_moved_deg);
+  } else {
+    throw Error(ErrorCode::usage, {},
+                fmt::format("--fault {}: expected drop, repeat, swap, flicker, jitter or moved", text));
+  }
+}
+
+CaptureOptions capture_options(Arguments const& arguments) {
+  CaptureOptions options = arguments.capture;
+  options.views = arguments.views;
+  scan("--size", arguments.size, "%dx%d", "WIDTHxHEIGHT", &options.width, &options.height);
+  LightOptions& light = options.light;
+  light.pattern = arguments.pattern == "gray" ? LightOptions::Pattern::gray : LightOptions::Pattern::sweep;
+  scan("--projector", arguments.projector, "%dx%d", "WIDTHxHEIGHT", &light.projector_width, &light.projector_height);
+  if (arguments.beam.ends_with("step"))
+    scan("--beam", arguments.beam.substr(0, arguments.beam.size() - 4), "%lf", "MM or Nstep", &light.beam_steps);
+  else if (!arguments.beam.empty())
+    scan("--beam", arguments.beam, "%lf", "MM or Nstep", &light.beam_mm);
+  if (arguments.noise == "none")
+    options.sensor.full_scale_electrons = 0;
+  else if (!arguments.noise.empty())
+    scan("--noise", arguments.noise, "%lf:%lf", "ELECTRONS:READ or none", &options.sensor.full_scale_electrons,
+         &options.sensor.read_electrons);
+  options.scene.stage = !arguments.no_stage;
+  for (auto const& fault : arguments.faults) apply_fault(fault, options.faults);
+  options.validate();
+  return options;
+}
+
 Json to_json(SynthOptions const& options) {
-  return {{"views", options.views},
+  return {{"pattern", "range"},
+          {"views", options.views},
           {"layout", static_cast<int>(options.layout)},
           {"elevation_deg", options.elevation_deg},
           {"width", options.width},
@@ -70,18 +138,69 @@ void write_truth(fs::path const& folder, SynthResult const& result, TriangleMesh
   write_triangle_mesh(folder / "truth" / "model.ply", model);
 }
 
-void synth(Arguments const& arguments, Session& session) {
-  Context& context = session.context;
-  require_replaceable(arguments.output);
-  SynthOptions const options = resolve(arguments);
-  StageRecord record{"synth", to_json(options), Json::object(), {}, {}};
+Json to_json(CaptureOptions const& options) {
+  LightOptions const& light = options.light;
+  SceneOptions const& scene = options.scene;
+  SensorOptions const& sensor = options.sensor;
+  CaptureFaults const& faults = options.faults;
+  bool const gray = light.pattern == LightOptions::Pattern::gray;
+  return {{"pattern", gray ? "gray" : "sweep"},
+          {"views", options.views},
+          {"width", options.width},
+          {"height", options.height},
+          {"baseline_deg", options.baseline_deg},
+          {"boards", options.boards},
+          {"steps", light.steps},
+          {"beam_mm", light.beam_mm},
+          {"beam_steps", light.beam_steps},
+          {"projector", {light.projector_width, light.projector_height}},
+          {"rows", light.rows},
+          {"blur", light.blur},
+          {"ambient", scene.ambient},
+          {"gloss", scene.gloss},
+          {"gloss_exponent", scene.gloss_exponent},
+          {"interreflection", scene.interreflection},
+          {"stage", scene.stage},
+          {"backdrop", scene.backdrop},
+          {"full_scale_electrons", sensor.full_scale_electrons},
+          {"read_electrons", sensor.read_electrons},
+          {"bits", sensor.bits},
+          {"gamma", sensor.gamma},
+          {"exposure", sensor.exposure},
+          {"fault_side", static_cast<int>(faults.side)},
+          {"drop", faults.drop},
+          {"repeat", faults.repeat},
+          {"swap", faults.swap},
+          {"flicker", faults.flicker},
+          {"jitter", faults.jitter},
+          {"rig_moved_deg", faults.rig_moved_deg}};
+}
+
+/// What has been made before by `synth` may be made anew; nothing else is replaced.
+void require_own(fs::path const& folder) {
+  if (!fs::exists(folder / "capture.json") || !fs::exists(folder / "synth.json")) require_replaceable(folder);
+}
+
+/// True where the folder already holds what is asked for; its figures are then reported.
+bool is_done(Arguments const& arguments, StageRecord const& record, Session& session) {
+  if (arguments.force || !is_up_to_date(arguments.output, record)) return false;
+  session.report.update(read_stage_record(arguments.output, "synth").figures);
+  return true;
+}
+
+StageRecord new_record(Arguments const& arguments, Json options, Context const& context) {
+  StageRecord record{"synth", std::move(options), Json::object(), Json::object(), Json::object()};
   record.options["seed"] = context.seed;
   bool const is_file = fs::is_regular_file(arguments.model);
   record.inputs["model"] = is_file ? hash_file(arguments.model) : hash_bytes(arguments.model);
-  if (!arguments.force && is_up_to_date(arguments.output, record)) {
-    session.report.update(read_stage_record(arguments.output, "synth").figures);
-    return;
-  }
+  return record;
+}
+
+void synth_range(Arguments const& arguments, Session& session) {
+  Context& context = session.context;
+  SynthOptions const options = range_options(arguments);
+  StageRecord record = new_record(arguments, to_json(options), context);
+  if (is_done(arguments, record, session)) return;
   TriangleMesh const model = load_model(arguments.model);
   NewFolder fresh(arguments.output);
   StageOutcome const outcome =
@@ -107,25 +226,114 @@ void synth(Arguments const& arguments, Session& session) {
   session.report.update(outcome.figures);
 }
 
+Json capture_figures(CaptureRig const& rig, TriangleMesh const& model) {
+  CaptureOptions const& options = rig.options();
+  return {{"views", options.views},
+          {"pattern", options.light.pattern == LightOptions::Pattern::gray ? "gray" : "sweep"},
+          {"frames", rig.light().frames()},
+          {"unit", "mm"},
+          {"triangles", model.triangles.size()},
+          {"baseline", rig.layout().rig.baseline()},
+          {"distance", (rig.layout().room_from_left.translation() - rig.layout().target).norm()},
+          {"beam_steps", rig.light().beam_steps()},
+          {"truth",
+           {{"poses", "truth/scanset.json"},
+            {"depth", "truth/*.exr"},
+            {"visible", "truth/visible_*.png"},
+            {"model", "truth/model.ply"},
+            {"rig", "truth/rig.yml"}}},
+          {"noise",
+           {{"full_scale_electrons", options.sensor.full_scale_electrons},
+            {"read_electrons", options.sensor.read_electrons},
+            {"bits", options.sensor.bits},
+            {"exposure", rig.exposure()}}}};
+}
+
+void synth_capture(Arguments const& arguments, Session& session) {
+  Context& context = session.context;
+  CaptureOptions const options = capture_options(arguments);
+  StageRecord record = new_record(arguments, to_json(options), context);
+  if (is_done(arguments, record, session)) return;
+  TriangleMesh const model = load_model(arguments.model);
+  NewFolder fresh(arguments.output);
+  CaptureRig const rig(model, options, context);
+  write_capture(fresh.path(), model, rig, context);
+  for (char const* file : {"capture.json", "rig.yml", "truth/scanset.json"})
+    record.outputs[file] = hash_file(fresh.path() / file);
+  record.figures = capture_figures(rig, model);
+  write_stage_record(fresh.path(), record);
+  fresh.commit();
+  session.report.update(record.figures);
+}
+
+void synth(Arguments const& arguments, Session& session) {
+  require_own(arguments.output);
+  if (arguments.pattern == "range")
+    synth_range(arguments, session);
+  else
+    synth_capture(arguments, session);
+}
+
+void add_capture_options(CLI::App& verb, Arguments& arguments) {
+  std::string const group = "sweep, gray";
+  CaptureOptions& options = arguments.capture;
+  auto const add = [&](char const* name, auto& value, char const* what) {
+    verb.add_option(name, value, what)->group(group);
+  };
+  add("--steps", options.light.steps, "Positions of the light");
+  add("--beam", arguments.beam,
+      "Standard deviation of the beam: MM at the object, or Nstep (default 0.8/96 of the sweep)");
+  add("--projector", arguments.projector, "WIDTHxHEIGHT of the projector (gray)");
+  verb.add_flag("--rows", options.light.rows, "Gray code of the projector's rows as well")->group(group);
+  add("--blur", options.light.blur, "Standard deviation of a projector pixel's blur, in its pixels");
+  add("--ambient", options.scene.ambient, "Light that is always there, as a share of the beam's");
+  add("--gloss", options.scene.gloss, "Share of light that a glossy lobe sends back");
+  add("--gloss-exponent", options.scene.gloss_exponent, "Of the lobe: large is narrow");
+  add("--interreflection", options.scene.interreflection, "1: light's first bounce between surfaces; 0: none");
+  verb.add_flag("--no-stage", arguments.no_stage, "No turntable, no backdrop, no empty scene")->group(group);
+  add("--backdrop", options.scene.backdrop, "Paint of turntable and backdrop, #rrggbb");
+  add("--bits", options.sensor.bits, "8 or 16");
+  add("--gamma", options.sensor.gamma, "Of the cameras' response; 1: linear");
+  add("--saturate", options.sensor.exposure, "Exposure, 1: the brightest diffuse surface just stays below full scale");
+  add("--baseline-deg", options.baseline_deg, "Angle between the cameras, as seen from the object");
+  add("--boards", options.boards, "Pairs of pictures of a chessboard");
+  add("--fault", arguments.faults,
+      "drop:FRAME, repeat:FRAME, swap:FRAME (each with :left or :right for one camera only), flicker:SHARE, "
+      "jitter:STEPS, moved:DEGREES");
+}
+
+void add_range_options(CLI::App& verb, Arguments& arguments) {
+  auto const add = [&](char const* name, auto& value, char const* what) {
+    return verb.add_option(name, value, what)->group("range");
+  };
+  add("--layout", arguments.layout, "sphere or circle (a turntable)")->check(CLI::IsMember({"sphere", "circle"}));
+  add("--elevation", arguments.range.elevation_deg, "Of a circle, in degrees");
+  add("--distance", arguments.range.distance, "Of the eye, in radii of the object");
+  add("--color-noise", arguments.range.noise.color_sigma, "Standard deviation of an 8-bit channel");
+  add("--disturb", arguments.disturb, "DEGREES:PERCENT: poses off by so much (percent of the size)");
+}
+
 }  // namespace
 
 void add_synth(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("synth", "Scans a model: range images, colours, and the exact truth beside them");
+  CLI::App* verb = app.add_subcommand(
+      "synth", "Captures a model: what two cameras see of a swept light, and the exact truth beside it");
   std::string names;
   for (auto const& name : builtin_model_names()) names += " " + name;
   verb->add_option("model", arguments->model, "A PLY or OBJ file, or a built-in object:" + names)->required();
-  verb->add_option("-o,--output", arguments->output, "The scan set to make")->required();
-  verb->add_option("--views", arguments->options.views, "How many");
-  verb->add_option("--layout", arguments->layout, "sphere or circle (a turntable)")
-      ->check(CLI::IsMember({"sphere", "circle"}));
-  verb->add_option("--elevation", arguments->options.elevation_deg, "Of a circle, in degrees");
-  verb->add_option("--size", arguments->size, "WIDTHxHEIGHT of a view");
-  verb->add_option("--distance", arguments->options.distance, "Of the eye, in radii of the object");
-  verb->add_option("--noise", arguments->options.noise.depth_sigma,
-                   "Standard deviation of a depth, as a share of the radius");
-  verb->add_option("--color-noise", arguments->options.noise.color_sigma, "Standard deviation of an 8-bit channel");
-  verb->add_option("--disturb", arguments->disturb, "DEGREES:PERCENT: poses off by so much (percent of the size)");
+  verb->add_option("-o,--output", arguments->output, "The capture (or scan set) to make")->required();
+  verb->add_option("--pattern", arguments->pattern,
+                   "sweep: a plane of light in steps; gray: a projector's Gray code; range: no capture, but a scan set "
+                   "of finished range images")
+      ->check(CLI::IsMember({"sweep", "gray", "range"}));
+  verb->add_option("--views", arguments->views, "How many");
+  verb->add_option("--size", arguments->size, "WIDTHxHEIGHT of a picture");
+  verb->add_option("--noise", arguments->noise,
+                   "sweep, gray: ELECTRONS:READ at full scale and of reading out (10000:10), or none; range: standard "
+                   "deviation of a depth, as a share of the radius");
+  add_capture_options(*verb, *arguments);
+  add_range_options(*verb, *arguments);
   verb->add_flag("--force", arguments->force, "Also where nothing changed");
   verb->callback([arguments, &session] {
     session.verb = "synth";

@@ -17,8 +17,7 @@ struct Solid {
 };
 
 /// The union of the solids as one closed mesh with a colour a vertex: that of the solid whose surface is nearest, the
-/// first of equals. A solid is evaluated only where its sphere is nearer than the solids before it, so the large ones
-/// come first. `box`, `spacing` and `slack` as in polygonise.
+/// first of equals. Only solids whose sphere is near are evaluated. `box`, `spacing` and `slack` as in polygonise.
 TriangleMesh make_assembly(std::vector<Solid> const& solids, Eigen::AlignedBox3f const& box, float spacing, float slack,
                            Context& context);
 

@@ -53,6 +53,59 @@ float bent_rod_distance(Vector3f const& p, Vector3f const& a, Vector3f const& b,
   return distance;
 }
 
+float box_distance(Vector3f const& p, Vector3f const& half, float rounding) {
+  Vector3f const q = p.cwiseAbs() - half + Vector3f::Constant(rounding);
+  return q.cwiseMax(0).norm() + std::min(q.maxCoeff(), 0.0f) - rounding;
+}
+
+BladeShape::BladeShape(Blade const& blade)
+    : blade_(blade),
+      across_((blade.b - blade.a).cross(blade.c - blade.a).normalized()),
+      center_(0.25f * blade.a + 0.5f * blade.b + 0.25f * blade.c),
+      radius_(0) {
+  Vector3f from = blade.a;
+  radius_ = (from - center_).norm();
+  for (int i = 0; i < kPieces; ++i) {
+    float const t = static_cast<float>(i + 1) / kPieces;
+    Vector3f const to = (1 - t) * (1 - t) * blade.a + 2 * t * (1 - t) * blade.b + t * t * blade.c;
+    Vector3f const along = to - from;
+    pieces_[i] = {from, along, 1 / along.squaredNorm(), 2 * (1 - blade.start) / (along.norm() * kPieces)};
+    radius_ = std::max(radius_, (to - center_).norm());
+    from = to;
+  }
+  radius_ = std::hypot(radius_, blade.half_width) + blade.half_thickness;
+}
+
+float BladeShape::distance(Vector3f const& p) const {
+  float const outside = (p - center_).norm() - radius_;
+  if (outside > 0.25f * radius_) return outside;
+  float const s = std::abs((p - blade_.a).dot(across_));
+  float nearest = 1e9f, at = 0, u_per_length = 1;
+  for (int i = 0; i < kPieces; ++i) {
+    Piece const& piece = pieces_[i];
+    Vector3f const q = p - piece.from;
+    float const free_share = q.dot(piece.along) * piece.inverse_squared;
+    float const share = std::clamp(free_share, 0.0f, 1.0f);
+    float const squared = (q - share * piece.along).squaredNorm();
+    if (squared >= nearest) continue;
+    nearest = squared;
+    u_per_length = piece.u_per_length;
+    at = static_cast<float>(i) + share;
+    if (i + 1 == kPieces && free_share > 1) {  // beyond the tip u runs on
+      at = static_cast<float>(i) + free_share;
+      nearest = (q - free_share * piece.along).squaredNorm();
+    }
+  }
+  // Where the spine is nearest: s across its plane, n within it. First the distance to the outline as if all were flat.
+  float const n_squared = std::max(nearest - s * s, 0.0f);
+  float const u = std::abs(2 * (blade_.start + (1 - blade_.start) * at / kPieces) - 1), v = s / blade_.half_width;
+  float const power = std::pow(u, blade_.fullness - 1), level = power * u + v * v;
+  float const gradient = std::hypot(0.5f * blade_.fullness * power * u_per_length, v / blade_.half_width);
+  float const outline = gradient > 1e-6f ? (level - std::sqrt(level)) / gradient : -blade_.half_width;
+  float const beyond = std::max(outline + blade_.half_thickness, 0.0f);
+  return std::sqrt(beyond * beyond + n_squared) - blade_.half_thickness;
+}
+
 float ring_distance(Vector3f const& p, float major, float minor) {
   return std::hypot(std::hypot(p.x(), p.y()) - major, p.z()) - minor;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 
 namespace scanview {
 
@@ -14,6 +15,40 @@ float rod_distance(Eigen::Vector3f const& p, Eigen::Vector3f const& a, Eigen::Ve
 /// A rod bent along the quadratic Bezier curve a, b, c.
 float bent_rod_distance(Eigen::Vector3f const& p, Eigen::Vector3f const& a, Eigen::Vector3f const& b,
                         Eigen::Vector3f const& c, float ra, float rc);
+/// A box about the origin from -half to half, its edges rounded.
+float box_distance(Eigen::Vector3f const& p, Eigen::Vector3f const& half, float rounding);
+
+/// A bent plate with a rounded edge: an ear, a petal, a leaf. Its outline runs from a tip at a to a tip at c, widest in
+/// the middle: half_width · sqrt(1 - |u|^fullness), u from -1 to 1; 2 is an ellipse, more is blunter.
+struct Blade {
+  Eigen::Vector3f a, b, c;  ///< its spine is this quadratic Bezier curve; not straight: it is flat across their plane
+  float half_width, half_thickness;
+  float start = 0;  ///< of the outline this share is missing at a: 0.5 starts where it is widest
+  float fullness = 2;
+};
+
+class BladeShape {
+ public:
+  explicit BladeShape(Blade const& blade);
+  /// First-order distance, exact on the surface; far away a lower bound.
+  float distance(Eigen::Vector3f const& p) const;
+  Blade const& blade() const { return blade_; }
+  /// A sphere that holds it.
+  Eigen::Vector3f const& center() const { return center_; }
+  float radius() const { return radius_; }
+
+ private:
+  static constexpr int kPieces = 10;
+  struct Piece {
+    Eigen::Vector3f from, along;
+    float inverse_squared, u_per_length;  // of the length of `along`; how fast u runs
+  };
+  Blade blade_;
+  Eigen::Vector3f across_, center_;
+  float radius_;
+  std::array<Piece, kPieces> pieces_;
+};
+
 /// A ring around the z axis.
 float ring_distance(Eigen::Vector3f const& p, float major, float minor);
 /// A disc around the y axis from y = low to high, its edges rounded.

@@ -16,7 +16,10 @@ using Eigen::Vector3f;
 using Eigen::Vector3i;
 using Distance = std::function<float(Vector3f const&)>;
 
-constexpr int kBlock = 8;                // samples a side of the blocks that are evaluated or skipped as a whole
+constexpr int kBlock = 8;        // samples a side of the blocks that are skipped or halved
+constexpr int kLeaf = 2;         // samples a side of those that are evaluated one by one
+constexpr float kCloser = 1.5f;  // so much more slack for halves: the approximate distances that `slack` speaks of
+                                 // are worst, relatively, close to the surface
 constexpr std::size_t kChunk = 1 << 13;  // vertices a task
 
 /// The corners of a cell: corner c is at (c & 1, c >> 1 & 1, c >> 2).
@@ -29,19 +32,10 @@ class Grid {
     Vector3i const blocks = (box.sizes() / (spacing * kBlock)).array().ceil().cast<int>() + 1;
     size_ = blocks * kBlock;
     values_.assign(static_cast<std::size_t>(size_.x()) * size_.y() * size_.z(), 0.0f);
-    // A sample of a cell that the surface crosses lies within a cell's diagonal of the surface.
-    float const reach = slack * spacing * std::sqrt(3.0f) * (0.5f * kBlock + 1.0f);
     for_each_index(context, static_cast<std::size_t>(blocks.z()), [&](std::size_t bz) {
       for (int by = 0; by < blocks.y(); ++by)
-        for (int bx = 0; bx < blocks.x(); ++bx) {
-          Vector3i const first = kBlock * Vector3i(bx, by, static_cast<int>(bz));
-          float const centre = distance(point(first.cast<float>() + Vector3f::Constant(0.5f * (kBlock - 1))));
-          bool const near = std::abs(centre) < reach;
-          for (int z = first.z(); z < first.z() + kBlock; ++z)
-            for (int y = first.y(); y < first.y() + kBlock; ++y)
-              for (int x = first.x(); x < first.x() + kBlock; ++x)
-                values_[index(x, y, z)] = near ? distance(point(Vector3f(x, y, z))) : centre;
-        }
+        for (int bx = 0; bx < blocks.x(); ++bx)
+          fill(distance, slack, kBlock * Vector3i(bx, by, static_cast<int>(bz)), kBlock);
     });
   }
 
@@ -68,6 +62,22 @@ class Grid {
   }
 
  private:
+  /// The samples of the cube of `side` samples from `first` on. Far from the surface its centre's value stands for all
+  /// of them, for only their sign matters.
+  void fill(Distance const& distance, float slack, Vector3i const& first, int side) {
+    // A sample of a cell that the surface crosses lies within a cell's diagonal of the surface.
+    float const reach = (side < kBlock ? kCloser : 1.0f) * slack * spacing_ * std::sqrt(3.0f) * (0.5f * side + 1.0f);
+    float const centre = distance(point(first.cast<float>() + Vector3f::Constant(0.5f * (side - 1))));
+    bool const near = std::abs(centre) < reach;
+    if (near && side > kLeaf) {
+      for (int c = 0; c < 8; ++c) fill(distance, slack, first + side / 2 * corner_offset(c), side / 2);
+      return;
+    }
+    for (int z = first.z(); z < first.z() + side; ++z)
+      for (int y = first.y(); y < first.y() + side; ++y)
+        for (int x = first.x(); x < first.x() + side; ++x)
+          values_[index(x, y, z)] = near ? distance(point(Vector3f(x, y, z))) : centre;
+  }
   std::size_t index(int x, int y, int z) const { return (static_cast<std::size_t>(z) * size_.y() + y) * size_.x() + x; }
   Vector3f origin_;
   float spacing_;

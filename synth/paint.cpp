@@ -20,6 +20,11 @@ cv::Vec3b bgr_from_paint(Vector3f const& color) {
           cv::saturate_cast<uchar>(255 * color.x())};
 }
 
+Vector3f within_albedo(Vector3f const& color) {
+  constexpr float kDarkest = 0.2209f, kLightest = 0.9547f;  // sRGB of the linear 0.04 and 0.9
+  return color.cwiseMax(kDarkest).cwiseMin(kLightest);
+}
+
 Vector3f mix(Vector3f const& a, Vector3f const& b, float t) { return a + (b - a) * t; }
 
 float soft_step(float edge, float x, float width) {

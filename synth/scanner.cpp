@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "base/srgb.h"
+#include "synth/centered_model.h"
 #include "synth/ray_scene.h"
 #include "synth/surface_light.h"
 
@@ -25,32 +26,6 @@ constexpr int kBandRows = 8;     // a task
 constexpr int kSamplesSide = 4;  // rays a side of a pixel for colour
 static_assert(kSamplesSide * kSamplesSide == kPacket);
 
-/// The model around its own centre, so that single precision serves models far from the origin as well.
-struct CenteredModel {
-  Vector3d center = Vector3d::Zero();
-  double radius = 0;
-  std::vector<Vector3f> vertices;  // those that no triangle uses lie in the centre
-};
-
-CenteredModel centered(TriangleMesh const& model) {
-  Eigen::AlignedBox3d box;
-  for (auto const& t : model.triangles)
-    for (int c = 0; c < 3; ++c) box.extend(model.vertices[t[c]].cast<double>());
-  if (box.isEmpty()) throw Error(ErrorCode::bad_input, {}, "the model has no triangles: nothing to scan");
-  CenteredModel result;
-  result.center = box.center();
-  for (auto const& t : model.triangles)
-    for (int c = 0; c < 3; ++c)
-      result.radius = std::max(result.radius, (model.vertices[t[c]].cast<double>() - result.center).norm());
-  if (!(result.radius > 0) || !std::isfinite(result.radius))
-    throw Error(ErrorCode::bad_input, {}, "the model has no extent: nothing to scan");
-  result.vertices.assign(model.vertices.size(), Vector3f::Zero());
-  for (auto const& t : model.triangles)
-    for (int c = 0; c < 3; ++c)
-      result.vertices[t[c]] = (model.vertices[t[c]].cast<double>() - result.center).cast<float>();
-  return result;
-}
-
 /// From the object's centre to the eye of a view, unit.
 Vector3d eye_direction(SynthOptions const& options, int view) {
   if (options.layout == SynthOptions::Layout::circle) {
@@ -61,19 +36,6 @@ Vector3d eye_direction(SynthOptions const& options, int view) {
   double const y = 1 - (2.0 * view + 1) / options.views;
   double const r = std::sqrt(1 - y * y), azimuth = std::numbers::pi * (3 - std::sqrt(5.0)) * view;
   return {r * std::sin(azimuth), y, r * std::cos(azimuth)};
-}
-
-/// A camera at `eye` that looks at `target`, its picture's upper side towards +y (towards -z when it looks down or up).
-Isometry3d look_at(Vector3d const& eye, Vector3d const& target) {
-  Vector3d const forward = (target - eye).normalized();
-  Vector3d const up = std::abs(forward.y()) > 0.9999 ? Vector3d(0, 0, -1) : Vector3d(0, 1, 0);
-  Vector3d const right = forward.cross(up).normalized();
-  Isometry3d pose = Isometry3d::Identity();
-  pose.linear().col(0) = right;
-  pose.linear().col(1) = forward.cross(right);
-  pose.linear().col(2) = forward;
-  pose.translation() = eye;
-  return pose;
 }
 
 /// One focal length for all views: as long as the model stays within 94 % of every picture's width and height, and no
@@ -133,12 +95,8 @@ class ViewScan {
     Vector3d const direction = rotation_ * camera_.ray_direction(x, y);
     RayHit const hit = scene_.first_hit(eye_.cast<float>(), direction.cast<float>());
     if (hit.triangle < 0) return kMissing;
-    auto const& t = triangles_[hit.triangle];
-    Vector3d const a = vertex(t[0]), normal = (vertex(t[1]) - a).cross(vertex(t[2]) - a);
-    // The direction has z = 1 in the camera, so the ray's parameter is the depth. A plane seen edge-on says nothing.
-    double const exact = normal.dot(a - eye_) / normal.dot(direction);
-    double const margin = 1e-4 * (hit.distance + model_.radius);
-    return std::abs(exact - hit.distance) < margin ? static_cast<float>(exact) : hit.distance;
+    // The direction has z = 1 in the camera, so the ray's parameter is the depth.
+    return static_cast<float>(exact_distance(model_, triangles_[hit.triangle], hit, eye_, direction));
   }
 
   /// Calls `work(hit, direction)` for the 4 x 4 rays of a pixel.
@@ -155,8 +113,6 @@ class ViewScan {
   }
 
  private:
-  Vector3d vertex(int i) const { return model_.vertices[i].cast<double>(); }
-
   CenteredModel const& model_;
   std::vector<Eigen::Vector3i> const& triangles_;
   RayScene const& scene_;

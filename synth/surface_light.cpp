@@ -165,4 +165,25 @@ Vector3f SurfaceLight::leaving(RayHit const& hit, Vector3f const& direction) con
   return (1 - hit.u - hit.v) * light[c[0]] + hit.u * light[c[1]] + hit.v * light[c[2]];
 }
 
+Vector3f SurfaceLight::normal(RayHit const& hit, Vector3f const& direction) const {
+  Vector3i const& c = corners_[hit.triangle];
+  auto const at = [&](int i) { return points_[c[i]].normal_sum.normalized(); };
+  Vector3f const smooth = ((1 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2)).normalized();
+  return side_seen(hit.triangle, direction) == front ? smooth : Vector3f(-smooth);
+}
+
+Vector3f SurfaceLight::albedo(RayHit const& hit) const {
+  static std::array<float, 256> const linear = [] {
+    std::array<float, 256> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) table[i] = static_cast<float>(linear_from_srgb8()[i]);
+    return table;
+  }();
+  Vector3i const& t = triangles_[hit.triangle];
+  auto const at = [&](int i) {
+    cv::Vec3b const bgr = colors_.empty() ? kPlaster : colors_[t[i]];
+    return Vector3f(linear[bgr[2]], linear[bgr[1]], linear[bgr[0]]);
+  };
+  return (1 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2);
+}
+
 }  // namespace scanview

@@ -29,6 +29,10 @@ class SurfaceLight {
   void light(RayScene const& scene, float radius, Context& context);
   /// Light that leaves towards the ray's origin; black where it was not lit.
   Eigen::Vector3f leaving(RayHit const& hit, Eigen::Vector3f const& direction) const;
+  /// The smooth normal that the shading uses, unit, towards the ray's origin (zero on a degenerate triangle).
+  Eigen::Vector3f normal(RayHit const& hit, Eigen::Vector3f const& direction) const;
+  /// The share of light that the surface sends back, linear R G B.
+  Eigen::Vector3f albedo(RayHit const& hit) const;
 
  private:
   /// A vertex as seen by the triangles around it that share a smooth normal.

@@ -15,8 +15,8 @@ namespace fs = std::filesystem;
 class Pipeline : public VerbTest {};
 
 TEST_F(Pipeline, ASyntheticScanComesBack) {
-  run({"synth", "statuette", "-o", in("scan"), "--views", "24", "--noise", "0.001", "--color-noise", "1", "--disturb",
-       "3:2"});
+  run({"synth", "statuette", "--pattern", "range", "-o", in("scan"), "--views", "24", "--noise", "0.001",
+       "--color-noise", "1", "--disturb", "3:2"});
   Json const all = run({"run", in("scan"), "-o", in("set"), "--hold-out", "every:2"});
   for (char const* verb : {"import", "register", "mesh", "render", "evaluate"})
     EXPECT_TRUE(all["stages"].contains(verb)) << verb;
@@ -39,7 +39,7 @@ TEST_F(Pipeline, ASyntheticScanComesBack) {
 }
 
 TEST_F(Pipeline, PicturesHaveAlphaAndDepth) {
-  run({"synth", "statuette", "-o", in("set"), "--views", "6", "--size", "160x120"});
+  run({"synth", "statuette", "--pattern", "range", "-o", in("set"), "--views", "6", "--size", "160x120"});
   run({"mesh", in("set")});
   Json const report = run({"render", in("set"), "--orbit", "3", "--size", "90x70", "-o", in("orbit")});
   ASSERT_EQ(report["frames"].size(), 3U);
@@ -63,7 +63,8 @@ TEST_F(Pipeline, FewViewsAndCirclesGiveDefinedPictures) {
   };
   for (Case const& one : {Case{"1", "sphere"}, Case{"2", "sphere"}, Case{"3", "circle"}, Case{"8", "circle"}}) {
     std::string const set = in(std::string(one.layout) + one.views);
-    run({"synth", "statuette", "-o", set, "--views", one.views, "--layout", one.layout, "--size", "120x90"});
+    run({"synth", "statuette", "--pattern", "range", "-o", set, "--views", one.views, "--layout", one.layout, "--size",
+         "120x90"});
     // Two opposite views share no surface: exit code 6 says so, and their pictures are there all the same.
     CommandResult const result = run_scanview({"run", set, "--quiet"});
     EXPECT_TRUE(result.exit_code == 0 || result.exit_code == 6) << result.errors;
@@ -73,7 +74,7 @@ TEST_F(Pipeline, FewViewsAndCirclesGiveDefinedPictures) {
 }
 
 TEST_F(Pipeline, ExportsComeBack) {
-  run({"synth", "statuette", "-o", in("set"), "--views", "3", "--size", "160x120"});
+  run({"synth", "statuette", "--pattern", "range", "-o", in("set"), "--views", "3", "--size", "160x120"});
   run({"mesh", in("set")});
   for (char const* kind : {"colmap", "nerfstudio"}) {
     run({"export", in("set"), "--to", kind, "-o", in(kind)});

@@ -18,8 +18,9 @@ class Resume : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder;
-    CommandResult const synth = run_scanview({"synth", "statuette", "-o", scan().string(), "--views", "8", "--layout",
-                                              "circle", "--size", "120x90", "--noise", "0.002", "--disturb", "1:0.5"});
+    CommandResult const synth =
+        run_scanview({"synth", "statuette", "--pattern", "range", "-o", scan().string(), "--views", "8", "--layout",
+                      "circle", "--size", "120x90", "--noise", "0.002", "--disturb", "1:0.5"});
     ASSERT_EQ(synth.exit_code, 0) << synth.errors;
     ASSERT_EQ(run(reference()).exit_code, 0);
   }

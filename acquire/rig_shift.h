@@ -1,0 +1,34 @@
+#pragma once
+#include <limits>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "base/context.h"
+#include "base/files.h"
+
+namespace scanview {
+
+/// How far matches of two rectified pictures lie off their rows: the trace of a rig that moved since its calibration.
+/// Over the left picture the offset is dy = offset + tilt (x - middle) / width + stretch (y - middle) / height.
+struct RigShift {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::size_t points = 0;                             ///< textured places measured
+  double median_px = kNone, median_std_px = kNone;    ///< right row minus left row
+  double offset_px = kNone, offset_std_px = kNone;    ///< a turn up or down (pitch)
+  double tilt_px = kNone, tilt_std_px = kNone;        ///< a turn about the viewing axis (roll)
+  double stretch_px = kNone, stretch_std_px = kNone;  ///< a change of focal length or of the turn to the side
+  double rms_px = kNone;                              ///< of the fitted dy over the points
+  std::string warning;                                ///< a sentence where rms_px is above 0.3 and significant
+
+  Json to_json() const;
+};
+
+/// Measures it from texture: where the left picture has detail, the matched strip of the right one is shifted by rows
+/// until it fits (normalised correlation over `most_px` rows up and down, then a least squares step), so neither gain
+/// nor offset of brightness matters. `left` and `right` are gray, 8 or 16 bits, rectified; `x_right` (size of `left`)
+/// is the column in the right picture that shows the left pixel, NaN where unknown. Fewer than 30 places give points
+/// and NaN. Takes milliseconds for some thousand places. Throws Error{bad_input} for other types or sizes.
+RigShift measure_rig_shift(cv::Mat const& left, cv::Mat const& right, cv::Mat1f const& x_right, Context& context,
+                           int most_px = 4);
+
+}  // namespace scanview

@@ -1,0 +1,25 @@
+#include "synth/linear_color.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "base/error.h"
+#include "base/srgb.h"
+
+namespace scanview {
+
+Eigen::Vector3f linear_from_hex(std::string const& hex) {
+  unsigned value = 0;
+  char const* const end = hex.data() + hex.size();
+  bool good = hex.size() == 7 && hex[0] == '#';
+  if (good) {
+    auto const parsed = std::from_chars(hex.data() + 1, end, value, 16);
+    good = parsed.ec == std::errc() && parsed.ptr == end;
+  }
+  if (!good) throw Error(ErrorCode::usage, {}, fmt::format("colour '{}': expected #rrggbb", hex));
+  auto const channel = [&](int shift) { return static_cast<float>(linear_from_srgb8()[value >> shift & 0xff]); };
+  return {channel(16), channel(8), channel(0)};
+}
+
+}  // namespace scanview
