@@ -235,8 +235,9 @@ cv::Mat1i whole_codes(GrayBits const& bits, cv::Mat1f const& noise_of_d, std::op
       bool const weak = size_of(bits.weakest(y, x)) < doubtful;
       bool good = !count || k < *count;
       if (weak)
-        good = good && size_of(bits.second(y, x)) >= doubtful && size_of(bits.finest(y, x)) >= doubtful &&
-               flips_to_neighbour(k, bits.weakest_bit(y, x));
+        good = good && size_of(bits.second(y, x)) >= doubtful &&
+               (flips_to_neighbour(k, bits.weakest_bit(y, x)) ||
+                (size_of(bits.finest(y, x)) < doubtful && flips_to_neighbour(k ^ 1, bits.weakest_bit(y, x))));
       codes(y, x) = good ? k : -2;
     }
   return codes;
