@@ -7,97 +7,28 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "acquire/decode_gray.h"
-#include "acquire/decode_sweep.h"
-#include "acquire/frame_stream.h"
+#include "acquire/code_correspondences.h"
+#include "acquire/decode_capture.h"
 #include "acquire/match_codes.h"
 #include "acquire/rectification.h"
+#include "acquire/remove_background.h"
+#include "acquire/rig_shift.h"
 #include "base/error.h"
 #include "base/image_file.h"
+#include "base/median.h"
 #include "base/parallel.h"
+#include "calib/relative_pose.h"
 
 namespace scanview {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// One camera's pictures of one view, decoded.
-struct Decoded {
-  CodeImage image;
-  cv::Mat1i rows;     // of the projector; may be empty
-  cv::Mat1b centres;  // of stripes; may be empty
-  PixelNoise noise;
-  double beam_sigma = 0;
-};
+constexpr double kRimShare = 0.6;     // of the light that a pixel farther in shows
+constexpr double kLeastAngleDeg = 1;  // between the two rays of a point
+constexpr int kAngleStep = 16;        // rows and columns, of the points whose angle is looked at
 
-cv::Mat read_frame(fs::path const& path, Camera const& camera) {
-  cv::Mat frame = read_gray(path);
-  if (frame.cols != camera.width() || frame.rows != camera.height())
-    throw Error(ErrorCode::bad_input, path,
-                fmt::format("is {}×{}, but the camera was calibrated at {}×{}", frame.cols, frame.rows, camera.width(),
-                            camera.height()));
-  return frame;
-}
-
-class Decoders {
- public:
-  Decoders(Capture const& capture, AcquireOptions const& options) : capture_(capture), options_(options) {}
-
-  Decoded decode(std::string const& view, Side side, Camera const& camera, Context& context) const {
-    auto const read = [&](std::size_t i) {
-      return read_frame(capture_.frame_path(view, side, static_cast<int>(i)), camera);
-    };
-    auto const count = static_cast<std::size_t>(capture_.frame_count());
-    // All frames of a view have one depth: the first one's.
-    int depth = -1;
-    auto const check = [&](std::size_t i, cv::Mat const& frame) {
-      if (depth < 0) depth = frame.depth();
-      if (frame.depth() != depth)
-        throw Error(ErrorCode::bad_input, capture_.frame_path(view, side, static_cast<int>(i)),
-                    "has another number of bits than the frames before it");
-    };
-    Decoded result;
-    if (capture_.pattern == Capture::Pattern::gray) {
-      GrayDecoder decoder(capture_);
-      auto const level = [&](std::optional<std::array<std::string, 2>> const& files, GrayFrame::Kind kind) {
-        if (!files) return;
-        auto const path = capture_.path_of(view, (*files)[static_cast<std::size_t>(side)]);
-        decoder.add({kind}, read_frame(path, camera));
-      };
-      level(capture_.white, GrayFrame::Kind::white);
-      level(capture_.black, GrayFrame::Kind::black);
-      stream_frames(context, count, read, [&](std::size_t i, cv::Mat const& frame) {
-        check(i, frame);
-        decoder.add(capture_.gray[i], frame);
-      });
-      result.image = decoder.finish();
-      result.rows = decoder.rows();
-      result.noise = decoder.noise();
-    } else if (options_.decoder == AcquireOptions::Decoder::space_time) {
-      SpaceTimeDecoder decoder;
-      stream_frames(context, count, read, [&](std::size_t i, cv::Mat const& frame) {
-        check(i, frame);
-        decoder.add(frame);
-      });
-      result.image = decoder.finish(context);
-      result.noise = decoder.figures().noise;
-      result.beam_sigma = decoder.figures().beam_sigma;
-    } else {
-      StripeDecoder decoder;
-      stream_frames(context, count, read, [&](std::size_t i, cv::Mat const& frame) {
-        check(i, frame);
-        decoder.add(frame);
-      });
-      result.image = decoder.finish();
-      result.centres = decoder.centres();
-    }
-    return result;
-  }
-
- private:
-  Capture const& capture_;
-  AcquireOptions const& options_;
-};
+using Sides = std::array<DecodedSide, 2>;
 
 /// Where the ideal left camera and the rectified ones look in the pictures; the same for all views.
 struct Geometry {
@@ -112,41 +43,249 @@ struct Geometry {
   }
 };
 
-constexpr double kRimShare = 0.6;  // of the light that a pixel farther in shows
+/// The stage's work on one capture.
+class Acquisition {
+ public:
+  Acquisition(Capture const& capture, AcquireOptions const& options, Context& context)
+      : capture_(capture), options_(options), context_(context) {}
 
-double median(std::vector<float>& values) {
-  if (values.empty()) return 0;
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+  AcquireResult run() {
+    result_.files_read.push_back(capture_.file);
+    find_rig();
+    Geometry const geometry(result_.rig);
+    result_.set.unit = unit_from_string(result_.rig.unit, capture_.file);
+    BackgroundModel const background = background_model(geometry);
+    auto const names = capture_.view_names();
+    result_.set.views.resize(names.size());
+    result_.views.resize(names.size());
+    for_each_index(
+        context_, names.size(),
+        [&](std::size_t v) {
+          View& view = result_.set.views[v];
+          AcquiredView& figures = result_.views[v];
+          view.name = figures.name = names[v];
+          view.image = range_of(capture_.views[v], geometry, figures);
+          view.image.color = color_of(capture_.views[v], view.image.color);
+          cut(view.image);
+          if (options_.remove_background) figures.background_removed = remove_background(view.image, background);
+          finish_figures(view.image, figures);
+        },
+        "acquire");
+    for (View const& view : result_.set.views) view.image.check();
+    warn();
+    return std::move(result_);
+  }
 
-RangeImage range_of_view(Geometry const& geometry, Decoded& left, Decoded& right, AcquiredView& figures,
-                         Context& context) {
-  CodeLinks left_links = link_codes(left.image);
-  CodeLinks right_links = link_codes(right.image);
-  judge_mixed(left.image, left_links, kRimShare);
-  judge_mixed(right.image, right_links, 0);
-  CodeImage ideal = resample(left.image, left_links, geometry.left_map);
-  CodeRows const left_rows(resample(left.image, left_links, geometry.left_row_map), context);
-  CodeRows const right_rows(resample(right.image, right_links, geometry.right_row_map), context);
-  if (!left.centres.empty())
+ private:
+  /// From a file, or from the first view's own matches.
+  void find_rig() {
+    fs::path const file = !options_.rig.empty() ? options_.rig
+                          : capture_.rig        ? capture_.folder / *capture_.rig
+                                                : fs::path();
+    if (!file.empty()) {
+      auto const first = capture_.frame_path(capture_.views.front(), Side::left, 0);
+      result_.rig = read_stereo_rig(file, read_gray(first).size());
+      result_.files_read.push_back(file);
+      return;
+    }
+    if (!capture_.intrinsics)
+      throw Error(ErrorCode::bad_input, capture_.file,
+                  "names neither a rig nor intrinsics: calibrate the cameras, then say --rig FILE");
+    auto const& [left, right] = *capture_.intrinsics;
+    if (capture_.pattern != Capture::Pattern::gray || capture_.row_bits == 0)
+      throw Error(
+          ErrorCode::no_solution, capture_.file,
+          "there is no rig, and the light tells columns only: to find how the cameras stand to each other it takes "
+          "row bits as well, or a calibration (--rig FILE)");
+    first_view_ = Sides{decode(capture_.views.front(), Side::left, left.camera),
+                        decode(capture_.views.front(), Side::right, right.camera)};
+    RelativePoseOptions pose_options;
+    pose_options.refine_focal = options_.refine_focal;
+    auto const matches = code_correspondences((*first_view_)[0], (*first_view_)[1]);
+    RelativePoseResult const pose = solve_relative_pose(matches, left, right, pose_options, context_);
+    result_.relative_pose = pose.to_json();
+    if (!pose.solved()) throw Error(ErrorCode::no_solution, capture_.file, pose.reason);
+    for (auto const& held : pose.held) context_.warn(held);
+    result_.rig = pose.rig;
+    context_.log(
+        fmt::format("{} matches of the light place the cameras: {:.2f} px off the epipolar lines (median), "
+                    "the scale is free",
+                    pose.inliers, pose.epipolar_median_px));
+  }
+
+  DecodedSide decode(std::string const& view, Side side, Camera const& camera) const {
+    auto const decoder =
+        options_.decoder == AcquireOptions::Decoder::stripe ? SweepDecoder::stripe : SweepDecoder::space_time;
+    return decode_side(capture_, view, side, camera, decoder, context_);
+  }
+
+  /// Depths of a view (or of the empty scene), without colour: `color` is what the light showed, in gray.
+  RangeImage range_of(std::string const& folder, Geometry const& geometry, AcquiredView& figures) {
+    Sides sides;
+    if (first_view_ && folder == capture_.views.front())
+      sides = std::move(*first_view_);
+    else
+      sides = {decode(folder, Side::left, geometry.rig.left.camera),
+               decode(folder, Side::right, geometry.rig.right.camera)};
+    for (std::size_t s = 0; s < sides.size(); ++s) {
+      figures.beam_sigma[s] = sides[s].beam_sigma;
+      figures.noise_read[s] = sides[s].noise.read;
+      figures.noise_gain[s] = sides[s].noise.gain;
+      figures.soundness[to_string(kSides[s])] = sides[s].soundness;
+      figures.warnings.insert(figures.warnings.end(), sides[s].warnings.begin(), sides[s].warnings.end());
+    }
+    auto& [left, right] = sides;
+    CodeLinks left_links = link_codes(left.image), right_links = link_codes(right.image);
+    judge_mixed(left.image, left_links, kRimShare);
+    judge_mixed(right.image, right_links, 0);
+    CodeImage ideal = resample(left.image, left_links, geometry.left_map);
+    if (!left.centres.empty()) keep_centres(ideal, left.centres, geometry.left_map);
+    CodeRows const left_rows(resample(left.image, left_links, geometry.left_row_map), context_);
+    CodeRows const right_rows(resample(right.image, right_links, geometry.right_row_map), context_);
+    MatchFigures match;
+    RangeImage image =
+        match_codes(ideal, left_rows, right_rows, geometry.rectification, geometry.rig.left.camera, match, context_);
+    figures.decodable = match.decodable;
+    figures.ambiguous = match.ambiguous;
+    figures.sheet_scatter = match.sheet_scatter;
+    if (!left.rows.empty() && !right.rows.empty()) check_rows(image, left.rows, right.rows, geometry, figures);
+    measure_shift(image, left.image.lit, right.image.lit, geometry, figures);
+    cv::cvtColor(left.image.lit, image.color, cv::COLOR_GRAY2BGR);
+    return image;
+  }
+
+  /// The stripe decoder's own pixels: those that the middle of a stripe is in.
+  static void keep_centres(CodeImage& ideal, cv::Mat1b const& centres, cv::Mat2f const& map) {
     for (int y = 0; y < ideal.code.rows; ++y)
       for (int x = 0; x < ideal.code.cols; ++x) {
-        int const u = static_cast<int>(std::lround(geometry.left_map(y, x)[0])),
-                  v = static_cast<int>(std::lround(geometry.left_map(y, x)[1]));
-        if (!std::isfinite(ideal.code(y, x)) || left.centres(v, u) != 0) continue;
+        if (!ideal.has_code(x, y)) continue;
+        if (centres(static_cast<int>(map(y, x)[1] + 0.5F), static_cast<int>(map(y, x)[0] + 0.5F)) != 0) continue;
         ideal.code(y, x) = kMissing;
         ideal.classes(y, x) = static_cast<std::uint8_t>(PixelClass::no_light);
       }
-  MatchFigures match;
-  RangeImage image =
-      match_codes(ideal, left_rows, right_rows, geometry.rectification, geometry.rig.left.camera, match, context);
-  figures.decodable = match.decodable;
-  figures.ambiguous = match.ambiguous;
-  figures.sheet_scatter = match.sheet_scatter;
-  return image;
-}
+  }
+
+  /// Where a pixel's point is in the right camera's picture.
+  static Eigen::Vector2d in_right(RangeImage const& image, int x, int y, Geometry const& geometry) {
+    return geometry.rig.right.project(geometry.rig.right_from_left * image.point(x, y));
+  }
+
+  /// A match whose two pixels saw different rows of the projector is none.
+  void check_rows(RangeImage& image, cv::Mat1i const& left, cv::Mat1i const& right, Geometry const& geometry,
+                  AcquiredView& figures) const {
+    cv::Rect const in_picture({0, 0}, right.size());
+    for (int y = 0; y < image.depth.rows; ++y)
+      for (int x = 0; x < image.depth.cols; ++x) {
+        if (!image.has_depth(x, y)) continue;
+        auto const& at = geometry.left_map(y, x);
+        int const a = left(static_cast<int>(at[1] + 0.5F), static_cast<int>(at[0] + 0.5F));
+        Eigen::Vector2d const place = in_right(image, x, y, geometry);
+        cv::Point const pixel(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y())));
+        if (!in_picture.contains(pixel)) continue;
+        int const b = right(pixel);
+        if (a < 0 || b < 0) continue;
+        ++figures.row_pairs;
+        figures.row_off_2 += std::abs(a - b) > 2;
+        figures.row_off_4 += std::abs(a - b) > 4;
+        if (options_.use_rows && std::abs(a - b) > options_.row_tolerance) image.remove(x, y, PixelClass::inconsistent);
+      }
+  }
+
+  /// Whether texture lies on the rows where the calibration has it.
+  void measure_shift(RangeImage const& image, cv::Mat1b const& lit_left, cv::Mat1b const& lit_right,
+                     Geometry const& geometry, AcquiredView& figures) {
+    Rectification const& r = geometry.rectification;
+    cv::Mat1b left, right;
+    cv::remap(lit_left, left, geometry.left_row_map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    cv::remap(lit_right, right, geometry.right_row_map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    cv::Mat1f x_right(left.size(), kMissing);
+    for (int y = 0; y < image.depth.rows; ++y)
+      for (int x = 0; x < image.depth.cols; ++x) {
+        if (!image.has_depth(x, y)) continue;
+        Eigen::Vector3d const p = r.rectified_from_left * image.point(x, y);
+        Eigen::Vector2d const at = r.left.project(p);
+        cv::Point const pixel(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())));
+        if (!cv::Rect({0, 0}, left.size()).contains(pixel)) continue;
+        Eigen::Vector2d const there = r.right.project(p - Eigen::Vector3d(r.baseline, 0, 0));
+        x_right(pixel) = static_cast<float>(there.x() + pixel.x - at.x());
+      }
+    RigShift const shift = measure_rig_shift(left, right, x_right, context_);
+    figures.soundness["rig"] = shift.to_json();
+    if (!shift.warning.empty()) figures.warnings.push_back(shift.warning);
+  }
+
+  cv::Mat3b color_of(std::string const& folder, cv::Mat3b const& otherwise) const {
+    LensCamera const& left = result_.rig.left;
+    cv::Mat3b color = otherwise;
+    if (capture_.color) {
+      auto const path = capture_.path_of(folder, *capture_.color);
+      color = read_color(path);
+      if (color.size() != otherwise.size())
+        throw Error(ErrorCode::bad_input, path, "is not as large as the left camera's pictures");
+      color = undistort_color(color, left.camera, left.lens);
+    }
+    return color;
+  }
+
+  void cut(RangeImage& image) const {
+    for (int y = 0; y < image.depth.rows; ++y)
+      for (int x = 0; x < image.depth.cols; ++x)
+        if (image.has_depth(x, y) && (image.depth(y, x) < options_.min_depth || image.depth(y, x) > options_.max_depth))
+          image.remove(x, y, PixelClass::cut);
+  }
+
+  BackgroundModel background_model(Geometry const& geometry) {
+    BackgroundModel model;
+    if (!options_.remove_background) return model;
+    model.backdrop = capture_.backdrop;
+    model.backdrop_tolerance = options_.backdrop_tolerance;
+    if (!capture_.empty) return model;
+    AcquiredView figures;
+    model.empty = range_of(*capture_.empty, geometry, figures);
+    model.empty_has_color = capture_.color && fs::exists(capture_.path_of(*capture_.empty, *capture_.color));
+    if (model.empty_has_color) model.empty->color = color_of(*capture_.empty, model.empty->color);
+    return model;
+  }
+
+  void finish_figures(RangeImage const& image, AcquiredView& figures) const {
+    std::vector<double> sigmas, angles;
+    Eigen::Vector3d const right_eye = result_.rig.right_from_left.inverse().translation();
+    for (int y = 0; y < image.depth.rows; ++y)
+      for (int x = 0; x < image.depth.cols; ++x) {
+        if (!image.has_depth(x, y)) continue;
+        sigmas.push_back(image.sigma(y, x));
+        if (x % kAngleStep != 0 || y % kAngleStep != 0) continue;
+        Eigen::Vector3d const p = image.point(x, y), q = p - right_eye;
+        angles.push_back(std::atan2(p.cross(q).norm(), p.dot(q)) * 180 / std::numbers::pi);
+      }
+    figures.depths = sigmas.size();
+    figures.sigma_median = sigmas.empty() ? 0 : median(std::move(sigmas));
+    if (angles.empty()) return;
+    figures.angle_deg = median(std::move(angles));
+    if (figures.angle_deg < kLeastAngleDeg)
+      figures.warnings.push_back(
+          fmt::format("the two cameras see the scene under {:.2f}° only: depths are uncertain, as sigma says (move the "
+                      "cameras apart)",
+                      figures.angle_deg));
+  }
+
+  /// Each warning once, with the views it concerns.
+  void warn() {
+    std::vector<std::string> said;
+    for (auto const& view : result_.views)
+      for (auto const& warning : view.warnings) {
+        if (std::find(said.begin(), said.end(), warning) != said.end()) continue;
+        said.push_back(warning);
+        context_.warn(fmt::format("{}: {}", view.name, warning));
+      }
+  }
+
+  Capture const& capture_;
+  AcquireOptions const& options_;
+  Context& context_;
+  AcquireResult result_;
+  std::optional<Sides> first_view_;
+};
 
 }  // namespace
 
@@ -161,54 +300,7 @@ void AcquireOptions::validate() const {
 
 AcquireResult acquire(Capture const& capture, AcquireOptions const& options, Context& context) {
   options.validate();
-  AcquireResult result;
-  fs::path const rig_path = !options.rig.empty() ? options.rig
-                            : capture.rig        ? capture.folder / *capture.rig
-                                                 : fs::path();
-  if (rig_path.empty())
-    throw Error(ErrorCode::bad_input, capture.file, "there is no rig: calibrate, then say --rig FILE");
-  cv::Size const size = read_gray(capture.frame_path(capture.views.front(), Side::left, 0)).size();
-  result.rig = read_stereo_rig(rig_path, size);
-  result.files_read = {capture.file, rig_path};
-  Geometry const geometry(result.rig);
-  Decoders const decoders(capture, options);
-  auto const names = capture.view_names();
-  result.set.unit = unit_from_string(result.rig.unit, rig_path);
-  result.set.views.resize(capture.views.size());
-  result.views.resize(capture.views.size());
-  for_each_index(
-      context, capture.views.size(),
-      [&](std::size_t v) {
-        std::string const& folder = capture.views[v];
-        AcquiredView& figures = result.views[v];
-        figures.name = names[v];
-        std::array<Decoded, 2> sides;
-        for (Side const side : kSides) {
-          LensCamera const& camera = side == Side::left ? result.rig.left : result.rig.right;
-          auto const s = static_cast<std::size_t>(side);
-          sides[s] = decoders.decode(folder, side, camera.camera, context);
-          figures.beam_sigma[s] = sides[s].beam_sigma;
-          figures.noise_read[s] = sides[s].noise.read;
-          figures.noise_gain[s] = sides[s].noise.gain;
-        }
-        View& view = result.set.views[v];
-        view.name = names[v];
-        view.image = range_of_view(geometry, sides[0], sides[1], figures, context);
-        cv::Mat3b color;
-        if (capture.color)
-          color = read_color(capture.path_of(folder, *capture.color));
-        else
-          cv::cvtColor(sides[0].image.lit, color, cv::COLOR_GRAY2BGR);
-        view.image.color = undistort_color(color, result.rig.left.camera, result.rig.left.lens).clone();
-        std::vector<float> sigmas;
-        for (float const sigma : view.image.sigma)
-          if (std::isfinite(sigma)) sigmas.push_back(sigma);
-        figures.depths = sigmas.size();
-        figures.sigma_median = median(sigmas);
-      },
-      "acquire");
-  for (View const& view : result.set.views) view.image.check();
-  return result;
+  return Acquisition(capture, options, context).run();
 }
 
 }  // namespace scanview

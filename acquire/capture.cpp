@@ -97,6 +97,7 @@ void read_gray(Capture& capture, Json const& json) {
   int const count = capture.last - capture.first + 1;
   auto const rows_first = optional_integer(json, "rows_first", 0, kMostFrames, path);
   if (order.is_array()) {
+    capture.in_opencv_order = false;
     for (auto const& entry : order) capture.gray.push_back(parse_frame(json_text(entry, "order", path), path));
     if (static_cast<int>(capture.gray.size()) != count)
       fail(path, fmt::format("'order' names {} pictures, 'first' to 'last' are {}", capture.gray.size(), count));
@@ -155,6 +156,10 @@ Eigen::Vector3d read_backdrop(Json const& json, fs::path const& path) {
 }  // namespace
 
 char const* to_string(Side side) { return side == Side::left ? "left" : "right"; }
+
+bool Capture::has_inverses() const {
+  return std::any_of(gray.begin(), gray.end(), [](GrayFrame const& frame) { return frame.inverse; });
+}
 
 fs::path Capture::path_of(std::string const& view, std::string const& name) const { return folder / view / name; }
 

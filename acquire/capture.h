@@ -30,8 +30,9 @@ struct Capture {
   std::vector<std::string> views;
   std::array<std::string, 2> frames;  ///< of left and right: "left/{:04d}.png"
   int first = 0, last = 0;
-  std::vector<GrayFrame> gray;                           ///< what the frames first .. last (and rows) show; gray only
-  int bits = 0, row_bits = 0;                            ///< gray only
+  std::vector<GrayFrame> gray;  ///< what the frames first .. last (and rows) show; gray only
+  int bits = 0, row_bits = 0;   ///< gray only
+  bool in_opencv_order = true;  ///< columns, then rows, the most significant bit first, pattern before inverse
   std::optional<int> projector_columns, projector_rows;  ///< codes beyond are no codes
   std::optional<std::array<std::string, 2>> white, black;
   std::optional<std::string> color;
@@ -40,6 +41,7 @@ struct Capture {
   std::optional<std::string> empty;                     ///< a view without the object
   std::optional<Eigen::Vector3d> backdrop;              ///< R, G, B, 0 to 255
 
+  bool has_inverses() const;
   int frame_count() const { return pattern == Pattern::gray ? static_cast<int>(gray.size()) : last - first + 1; }
   /// The picture of a view ("view_000", or `*empty`), k counted from 0.
   std::filesystem::path frame_path(std::string const& view, Side side, int k) const;
