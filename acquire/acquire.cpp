@@ -36,10 +36,12 @@ struct Geometry {
   Rectification rectification;
   cv::Mat2f left_map, left_row_map, right_row_map;
 
-  explicit Geometry(StereoRig const& of) : rig(of), rectification(rectify(of)) {
-    left_map = picture_map(rig.left.camera, Eigen::Matrix3d::Identity(), rig.left);
-    left_row_map = picture_map(rectification.left, rectification.rectified_from_left, rig.left);
-    right_row_map = picture_map(rectification.right, rectification.rectified_from_right, rig.right);
+  Geometry(StereoRig const& of, Context& context) : rig(of), rectification(rectify(of)) {
+    for_each_index(context, 3, [&](std::size_t i) {
+      if (i == 0) left_map = picture_map(rig.left.camera, Eigen::Matrix3d::Identity(), rig.left);
+      if (i == 1) left_row_map = picture_map(rectification.left, rectification.rectified_from_left, rig.left);
+      if (i == 2) right_row_map = picture_map(rectification.right, rectification.rectified_from_right, rig.right);
+    });
   }
 };
 
@@ -52,7 +54,7 @@ class Acquisition {
   AcquireResult run() {
     result_.files_read.push_back(capture_.file);
     find_rig();
-    Geometry const geometry(result_.rig);
+    Geometry const geometry(result_.rig, context_);
     result_.set.unit = unit_from_string(result_.rig.unit, capture_.file);
     BackgroundModel const background = background_model(geometry);
     auto const names = capture_.view_names();
@@ -97,8 +99,7 @@ class Acquisition {
           ErrorCode::no_solution, capture_.file,
           "there is no rig, and the light tells columns only: to find how the cameras stand to each other it takes "
           "row bits as well, or a calibration (--rig FILE)");
-    first_view_ = Sides{decode(capture_.views.front(), Side::left, left.camera),
-                        decode(capture_.views.front(), Side::right, right.camera)};
+    first_view_ = decode_both(capture_.views.front(), left.camera, right.camera);
     RelativePoseOptions pose_options;
     pose_options.refine_focal = options_.refine_focal;
     auto const matches = code_correspondences((*first_view_)[0], (*first_view_)[1]);
@@ -113,6 +114,13 @@ class Acquisition {
                     pose.inliers, pose.epipolar_median_px));
   }
 
+  Sides decode_both(std::string const& view, Camera const& left, Camera const& right) const {
+    Sides sides;
+    for_each_index(context_, 2,
+                   [&](std::size_t s) { sides[s] = decode(view, kSides[s], kSides[s] == Side::left ? left : right); });
+    return sides;
+  }
+
   DecodedSide decode(std::string const& view, Side side, Camera const& camera) const {
     auto const decoder =
         options_.decoder == AcquireOptions::Decoder::stripe ? SweepDecoder::stripe : SweepDecoder::space_time;
@@ -125,23 +133,28 @@ class Acquisition {
     if (first_view_ && folder == capture_.views.front())
       sides = std::move(*first_view_);
     else
-      sides = {decode(folder, Side::left, geometry.rig.left.camera),
-               decode(folder, Side::right, geometry.rig.right.camera)};
+      sides = decode_both(folder, geometry.rig.left.camera, geometry.rig.right.camera);
+    reconcile(sides[0].soundness, sides[1].soundness);
     for (std::size_t s = 0; s < sides.size(); ++s) {
       figures.beam_sigma[s] = sides[s].beam_sigma;
       figures.noise_read[s] = sides[s].noise.read;
       figures.noise_gain[s] = sides[s].noise.gain;
-      figures.soundness[to_string(kSides[s])] = sides[s].soundness;
-      figures.warnings.insert(figures.warnings.end(), sides[s].warnings.begin(), sides[s].warnings.end());
+      auto const& sound = sides[s].soundness;
+      figures.soundness[to_string(kSides[s])] = sound.to_json();
+      figures.warnings.insert(figures.warnings.end(), sound.warnings.begin(), sound.warnings.end());
     }
     auto& [left, right] = sides;
-    CodeLinks left_links = link_codes(left.image), right_links = link_codes(right.image);
-    judge_mixed(left.image, left_links, kRimShare);
-    judge_mixed(right.image, right_links, 0);
-    CodeImage ideal = resample(left.image, left_links, geometry.left_map);
+    CodeImage ideal;
+    std::array<CodeRows, 2> rows;
+    for_each_index(context_, 2, [&](std::size_t s) {
+      CodeLinks links = link_codes(sides[s].image);
+      judge_mixed(sides[s].image, links, s == 0 ? kRimShare : 0);
+      rows[s] =
+          CodeRows(resample(sides[s].image, links, s == 0 ? geometry.left_row_map : geometry.right_row_map), context_);
+      if (s == 0) ideal = resample(left.image, links, geometry.left_map);
+    });
+    auto const& [left_rows, right_rows] = rows;
     if (!left.centres.empty()) keep_centres(ideal, left.centres, geometry.left_map);
-    CodeRows const left_rows(resample(left.image, left_links, geometry.left_row_map), context_);
-    CodeRows const right_rows(resample(right.image, right_links, geometry.right_row_map), context_);
     MatchFigures match;
     RangeImage image =
         match_codes(ideal, left_rows, right_rows, geometry.rectification, geometry.rig.left.camera, match, context_);

@@ -5,7 +5,6 @@
 #include "acquire/decode_gray.h"
 #include "acquire/decode_sweep.h"
 #include "acquire/frame_stream.h"
-#include "acquire/soundness.h"
 #include "base/error.h"
 #include "base/image_file.h"
 
@@ -40,11 +39,6 @@ void stream(Capture const& capture, std::string const& view, Side side, Camera c
       });
 }
 
-void note(SoundnessFigures const& figures, DecodedSide& result) {
-  result.soundness = figures.to_json();
-  result.warnings.insert(result.warnings.end(), figures.warnings.begin(), figures.warnings.end());
-}
-
 DecodedSide decode_gray(Capture const& capture, std::string const& view, Side side, Camera const& camera,
                         Context& context) {
   GrayDecoder decoder(capture);
@@ -69,7 +63,7 @@ DecodedSide decode_gray(Capture const& capture, std::string const& view, Side si
   result.image = decoder.finish();
   result.rows = decoder.rows();
   result.noise = decoder.noise();
-  if (in_order) note(soundness.finish(), result);
+  if (in_order) result.soundness = soundness.finish();
   return result;
 }
 
@@ -90,7 +84,7 @@ DecodedSide decode_side(Capture const& capture, std::string const& view, Side si
     else
       space_time.add(frame);
   });
-  note(soundness.finish(), result);
+  result.soundness = soundness.finish();
   if (is_stripe) {
     result.image = stripe.finish();
     result.centres = stripe.centres();
@@ -100,13 +94,6 @@ DecodedSide decode_side(Capture const& capture, std::string const& view, Side si
   auto const& figures = space_time.figures();
   result.noise = figures.noise;
   result.beam_sigma = figures.beam_sigma;
-  std::vector<PeakSample> peaks;
-  for (auto const& peak : figures.peaks) peaks.push_back({peak.amplitude, peak.ambient, peak.sigma});
-  ResponseFit const response = fit_response(peaks);
-  result.soundness["gamma"] = json_number(response.gamma);
-  result.soundness["gamma_std"] = json_number(response.std);
-  if (auto const warning = response_warning(to_string(side), response.gamma, response.std); !warning.empty())
-    result.warnings.push_back(warning);
   return result;
 }
 

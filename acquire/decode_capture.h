@@ -1,12 +1,11 @@
 #pragma once
 #include <string>
-#include <vector>
 
 #include "acquire/capture.h"
 #include "acquire/code_image.h"
 #include "acquire/pixel_noise.h"
+#include "acquire/soundness.h"
 #include "base/context.h"
-#include "base/files.h"
 
 namespace scanview {
 
@@ -17,8 +16,7 @@ struct DecodedSide {
   cv::Mat1b centres;  ///< of stripes; empty but for the stripe decoder
   PixelNoise noise;
   double beam_sigma = 0;  ///< in light steps (sweep)
-  Json soundness;
-  std::vector<std::string> warnings;
+  SoundnessFigures soundness;
 };
 
 enum class SweepDecoder { space_time, stripe };

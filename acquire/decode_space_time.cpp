@@ -144,12 +144,11 @@ struct SpaceTimeDecoder::TypedState final : State {
     for (int round = 0; round < 2; ++round) {
       NoiseFit fit(kFull);
       std::vector<double> widths;
-      figures.peaks.clear();
       for (int y = kSampleStep / 2; y < best.rows; y += kSampleStep)
         for (int x = kSampleStep / 2; x < best.cols; x += kSampleStep) {
           if (!may_be_lit(x, y, figures.noise)) continue;
           PeakSamples const s = samples(x, y);
-          Peak const peak = fit_peak(s, kReach, figures.noise, prior);
+          Peak const peak = fit_peak(s, kReach, figures.noise, prior, PeakDetail::with_leverage);
           if (!peak.converged || peak.degrees_of_freedom < 1) continue;
           for (int k = 0; k < kSpan; ++k) {
             double const u = (k - peak.time) / peak.width, share = 1 - peak.leverage[k];
@@ -159,8 +158,6 @@ struct SpaceTimeDecoder::TypedState final : State {
           }
           if (peak.height < 20 * std::sqrt(figures.noise.variance(peak.ambient))) continue;
           widths.push_back(peak.width);
-          figures.peaks.push_back(
-              {static_cast<float>(peak.height), static_cast<float>(peak.width), static_cast<float>(peak.ambient)});
         }
       figures.noise = fit.solve();
       if (widths.empty()) return;

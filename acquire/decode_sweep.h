@@ -12,11 +12,6 @@ namespace scanview {
 struct SweepFigures {
   PixelNoise noise;
   double beam_sigma = 0;  ///< median width (standard deviation) of the beam over time, in light steps; 0: nothing lit
-  /// Of thinly sampled pixels: height, width and ambient light of their peaks, for judging the camera's response.
-  struct Peak {
-    float amplitude, sigma, ambient;
-  };
-  std::vector<Peak> peaks;
 };
 
 /// Space-time decoder (Curless and Levoy 1995): each pixel's brightness over time has a peak as the beam passes, and

@@ -1,16 +1,11 @@
 #include "acquire/peak_fit.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace scanview {
 namespace {
-
-using Eigen::Matrix4f;
-using Eigen::Vector4f;
 
 constexpr int kSteps = 12;
 constexpr float kNarrowest = 0.2F, kWidest = 8;  // steps
@@ -39,86 +34,126 @@ Model start(PeakSamples const& s, int top) {
   return model;
 }
 
-/// Normal equations at a model, and the weighted sum of squares there.
+/// Normal equations of the four parameters at a model (ambient, height, time, width), and the weighted sum of squares.
+/// The matrix's upper triangle, row by row. Written out: this is what decoding a sweep spends its time with.
 struct Normal {
-  Matrix4f matrix = Matrix4f::Zero();
-  Vector4f gradient = Vector4f::Zero();
+  float m[10] = {};
+  float g[4] = {};
   float cost = 0;
 };
 
-Normal linearise(PeakSamples const& s, Model const& m, float const* weight, WidthPrior const& prior,
-                 Eigen::Matrix<float, 4, PeakSamples::kMost>* rows) {
+Normal linearise(PeakSamples const& s, Model const& model, PixelNoise const& noise, WidthPrior const& prior) {
   Normal n;
-  float const over = 1 / m.width;
+  float const over = 1 / model.width;
+  auto const read = static_cast<float>(noise.read), gain = static_cast<float>(noise.gain);
   for (int i = 0; i < s.count; ++i) {
     if (!s.usable[i]) continue;
-    float const u = (static_cast<float>(i) - m.time) * over;
+    float const u = (static_cast<float>(i) - model.time) * over;
     float const e = std::exp(-0.5F * u * u);
-    Vector4f const row(1, e, m.height * e * u * over, m.height * e * u * u * over);
-    float const residual = s.value[i] - (m.ambient + m.height * e);
-    n.matrix.noalias() += weight[i] * row * row.transpose();
-    n.gradient += weight[i] * residual * row;
-    n.cost += weight[i] * residual * residual;
-    if (rows) rows->col(i) = row;
+    float const expected = model.ambient + model.height * e;
+    float const weight = 1 / (read + gain * std::max(expected, 0.0F));
+    float const residual = s.value[i] - expected;
+    float const t = model.height * e * u * over, w = t * u;
+    float const we = weight * e, wt = weight * t, ww = weight * w, wr = weight * residual;
+    n.m[0] += weight, n.m[1] += we, n.m[2] += wt, n.m[3] += ww;
+    n.m[4] += we * e, n.m[5] += we * t, n.m[6] += we * w;
+    n.m[7] += wt * t, n.m[8] += wt * w;
+    n.m[9] += ww * w;
+    n.g[0] += wr, n.g[1] += wr * e, n.g[2] += wr * t, n.g[3] += wr * w;
+    n.cost += wr * residual;
   }
   auto const tie = static_cast<float>(1 / (prior.sigma * prior.sigma));
-  float const away = static_cast<float>(prior.width) - m.width;
-  n.matrix(3, 3) += tie;
-  n.gradient(3) += tie * away;
-  n.cost += tie * away * away;
+  float const away = static_cast<float>(prior.width) - model.width;
+  n.m[9] += tie;
+  n.g[3] += tie * away;
   return n;
 }
 
-void weigh(PeakSamples const& s, Model const& m, PixelNoise const& noise, float* weight) {
+/// Cholesky factor of the damped matrix, in place of its upper triangle (diagonal inverted); false where it is not
+/// positive.
+bool factorise(float* m, float damping) {
+  auto const at = [m](int i, int j) -> float& { return m[i * 4 - i * (i + 1) / 2 + j]; };
+  for (int i = 0; i < 4; ++i) {
+    float d = at(i, i) * (1 + damping);
+    for (int k = 0; k < i; ++k) d -= at(k, i) * at(k, i);
+    if (!(d > 0)) return false;
+    at(i, i) = 1 / std::sqrt(d);
+    for (int j = i + 1; j < 4; ++j) {
+      float v = at(i, j);
+      for (int k = 0; k < i; ++k) v -= at(k, i) * at(k, j);
+      at(i, j) = v * at(i, i);
+    }
+  }
+  return true;
+}
+
+void solve(float const* m, float* x) {
+  auto const at = [m](int i, int j) { return m[i * 4 - i * (i + 1) / 2 + j]; };
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < i; ++k) x[i] -= at(k, i) * x[k];
+    x[i] *= at(i, i);
+  }
+  for (int i = 3; i >= 0; --i) {
+    for (int k = i + 1; k < 4; ++k) x[i] -= at(i, k) * x[k];
+    x[i] *= at(i, i);
+  }
+}
+
+/// Share of each sample's own residual that the fit took up: weight · row' covariance row.
+void fill_leverage(PeakSamples const& s, Model const& model, PixelNoise const& noise, float const* factor, Peak& peak) {
   for (int i = 0; i < s.count; ++i) {
-    float const u = (static_cast<float>(i) - m.time) / m.width;
-    weight[i] = static_cast<float>(1 / noise.variance(m.ambient + m.height * std::exp(-0.5F * u * u)));
+    peak.leverage[i] = 0;
+    if (!s.usable[i]) continue;
+    float const u = (static_cast<float>(i) - model.time) / model.width, e = std::exp(-0.5F * u * u);
+    float const t = model.height * e * u / model.width;
+    float const row[4] = {1, e, t, t * u};
+    float x[4] = {row[0], row[1], row[2], row[3]};
+    solve(factor, x);
+    double const variance = noise.variance(model.ambient + model.height * e);
+    peak.leverage[i] = (row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * x[3]) / variance;
   }
 }
 
 }  // namespace
 
-Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior) {
+Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior,
+              PeakDetail detail) {
   Model model = start(samples, static_cast<int>(start_time));
-  float weight[PeakSamples::kMost];
-  weigh(samples, model, noise, weight);
-  Normal normal = linearise(samples, model, weight, prior, nullptr);
+  Normal normal = linearise(samples, model, noise, prior);
   Peak peak;
   float damping = 1e-3F;
   for (int step = 0; step < kSteps && !peak.converged; ++step) {
-    Matrix4f damped = normal.matrix;
-    damped.diagonal() *= 1 + damping;
-    Vector4f const change = damped.ldlt().solve(normal.gradient);
-    Model const next{model.ambient + change(0), model.height + change(1), model.time + change(2),
-                     std::clamp(model.width + change(3), kNarrowest, kWidest)};
-    Normal const there = linearise(samples, next, weight, prior, nullptr);
-    if (!(there.cost < normal.cost)) {
-      peak.converged = std::abs(change(2)) < 1e-4F && std::isfinite(there.cost);
+    Normal damped = normal;
+    if (!factorise(damped.m, damping)) break;
+    float* const change = damped.g;
+    solve(damped.m, change);
+    Model const next{model.ambient + change[0], model.height + change[1],
+                     model.time + std::clamp(change[2], -0.7F, 0.7F),
+                     std::clamp(model.width + change[3], 0.6F * model.width, 1.6F * model.width)};
+    Normal const there = linearise(samples, next, noise, prior);
+    // The variances are the model's own, so the sum of squares may rise a little on the way to the likelihood's top.
+    if (!(there.cost < 1.5F * normal.cost + 1)) {
       damping *= 10;
       if (damping > 1e4F) break;
       continue;
     }
-    peak.converged = std::abs(change(2)) < 1e-3F && std::abs(change(3)) < 1e-2F;
+    peak.converged = std::abs(change[2]) < 2e-3F && std::abs(change[3]) < 1e-2F;
     model = next;
+    model.width = std::clamp(model.width, kNarrowest, kWidest);
     damping *= 0.1F;
-    weigh(samples, model, noise, weight);
-    normal = linearise(samples, model, weight, prior, nullptr);
+    normal = there;
   }
-  Eigen::Matrix<float, 4, PeakSamples::kMost> rows;
-  weigh(samples, model, noise, weight);
-  normal = linearise(samples, model, weight, prior, &rows);
-  Eigen::Matrix4d const covariance = normal.matrix.cast<double>().inverse();
+  Normal factor = normal;
+  bool const regular = factorise(factor.m, 0);
+  float column[4] = {0, 0, 1, 0};
+  if (regular) solve(factor.m, column);
   peak.ambient = model.ambient, peak.height = model.height, peak.time = model.time, peak.width = model.width;
-  peak.time_sigma = std::sqrt(covariance(2, 2));
+  peak.time_sigma = regular ? std::sqrt(static_cast<double>(column[2])) : std::numeric_limits<double>::quiet_NaN();
   peak.chi_square = normal.cost;
-  for (int i = 0; i < samples.count; ++i) {
-    peak.degrees_of_freedom += samples.usable[i];
-    if (!samples.usable[i]) continue;
-    Eigen::Vector4d const row = rows.col(i).cast<double>();
-    peak.leverage[i] = static_cast<double>(weight[i]) * row.dot(covariance * row);
-  }
+  for (int i = 0; i < samples.count; ++i) peak.degrees_of_freedom += samples.usable[i];
   peak.degrees_of_freedom -= 4;
   peak.converged = peak.converged && std::isfinite(peak.time_sigma) && peak.height > 0;
+  if (peak.converged && detail == PeakDetail::with_leverage) fill_leverage(samples, model, noise, factor.m, peak);
   return peak;
 }
 

@@ -18,7 +18,7 @@ struct Peak {
   double chi_square = 0;  ///< sum of squared residuals over their variances
   int degrees_of_freedom = 0;
   bool converged = false;
-  double leverage[PeakSamples::kMost];  ///< share of each sample's own residual that the fit took up
+  double leverage[PeakSamples::kMost];  ///< share of each sample's own residual that the fit took up, where asked for
 };
 
 /// What is known of the width beforehand: the same beam passes all pixels. It decides only where a peak is too narrow
@@ -28,8 +28,11 @@ struct WidthPrior {
   double sigma = 1e3;  ///< large: nothing is known
 };
 
+enum class PeakDetail { without_leverage, with_leverage };
+
 /// Maximum likelihood of the four parameters under the noise (Levenberg-Marquardt; the variances are those of the
-/// model, as of the step before). `start_time` is where the greatest value is.
-Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior);
+/// model itself). `start_time` is where the greatest value is.
+Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior,
+              PeakDetail detail = PeakDetail::without_leverage);
 
 }  // namespace scanview

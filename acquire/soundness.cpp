@@ -9,18 +9,6 @@
 #include "base/median.h"
 
 namespace scanview {
-namespace {
-
-// The beam's width in light, from its width in values under the response value = light^(1 / gamma): the value's half
-// height is another height of the light.
-double light_width(PeakSample const& peak, double gamma) {
-  double const base = std::pow(peak.ambient, gamma), top = std::pow(peak.ambient + peak.amplitude, gamma);
-  double const half = std::pow(peak.ambient + peak.amplitude / 2, gamma);
-  return peak.width * std::sqrt(std::log(2.0) / std::log((top - base) / (half - base)));
-}
-
-}  // namespace
-
 Json SoundnessFigures::to_json() const {
   return {{"frames", frames},
           {"lit_share", json_number(lit_share)},
@@ -77,41 +65,17 @@ std::vector<float> LineSamples::take(cv::Mat const& picture) {
   return values;
 }
 
-ResponseFit fit_response(std::vector<PeakSample> const& peaks) {
-  std::vector<PeakSample> usable;
-  for (PeakSample const& peak : peaks)
-    if (peak.amplitude > 0 && peak.ambient >= 0 && peak.width > 0 && std::isfinite(peak.amplitude + peak.width))
-      usable.push_back(peak);
-  if (usable.size() < 100) return {};
-  // Least absolute slope against the predictor that gamma acts by: the width's logarithm must not depend on the height
-  // above the ambient light. Medians of the lower and the upper third decide, so that outliers do not.
-  std::sort(usable.begin(), usable.end(),
-            [](PeakSample const& a, PeakSample const& b) { return a.amplitude * b.ambient < b.amplitude * a.ambient; });
-  auto const third = static_cast<std::ptrdiff_t>(usable.size() / 3);
-  auto const logs = [&](std::ptrdiff_t first, std::ptrdiff_t last, double gamma) {
-    std::vector<double> values;
-    for (auto i = first; i < last; ++i)
-      values.push_back(std::log(light_width(usable[static_cast<std::size_t>(i)], gamma)));
-    return values;
+void reconcile(SoundnessFigures& left, SoundnessFigures& right) {
+  auto const is_near = [](std::vector<std::size_t> const& frames, std::size_t frame) {
+    return std::any_of(frames.begin(), frames.end(), [&](std::size_t f) { return f + 1 >= frame && f <= frame + 1; });
   };
-  auto const count = static_cast<std::ptrdiff_t>(usable.size());
-  auto const difference = [&](double gamma) {
-    return median(logs(count - third, count, gamma)) - median(logs(0, third, gamma));
-  };
-  // A larger gamma narrows high peaks more than low ones: the difference falls.
-  double low = 0.25, high = 5;
-  double const slope = (difference(1.25) - difference(0.8)) / 0.45;
-  if (!(slope < -1e-3)) return {};
-  for (int step = 0; step < 40; ++step) (difference((low + high) / 2) > 0 ? low : high) = (low + high) / 2;
-  ResponseFit fit;
-  fit.gamma = (low + high) / 2;
-  double const scatter = robust_deviation(logs(0, count, fit.gamma));
-  double const error = 1.2533 * scatter * std::sqrt(2.0 / static_cast<double>(third));
-  double const slope_there =
-      (difference(fit.gamma * 1.1) - difference(fit.gamma / 1.1)) / (fit.gamma * (1.1 - 1 / 1.1));
-  double const std = error / std::max(1e-9, std::abs(slope_there));
-  if (std < 0.5) fit.std = std;
-  return fit;
+  auto const agreed = std::any_of(left.missing.begin(), left.missing.end(),
+                                  [&](std::size_t frame) { return is_near(right.missing, frame); });
+  if (agreed) return;
+  for (SoundnessFigures* figures : {&left, &right}) {
+    figures->missing.clear();
+    std::erase_if(figures->warnings, [](std::string const& w) { return w.find(kMissingFrame) != std::string::npos; });
+  }
 }
 
 std::string response_warning(std::string const& camera, double gamma, double std) {

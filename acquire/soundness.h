@@ -34,6 +34,12 @@ struct SoundnessFigures {
   Json to_json() const;
 };
 
+inline constexpr char kMissingFrame[] = "a frame seems to be missing";  ///< what its warning says
+
+/// What the left and the right camera say together: a frame is missing only where both miss it, for they see the same
+/// light. Takes a claim of one camera alone back, with its warning.
+void reconcile(SoundnessFigures& left, SoundnessFigures& right);
+
 /// The pixels that are looked at: some whole rows and columns, evenly spread, one after the other. All figures come
 /// from these, which keeps the cost far below that of reading a picture.
 class LineSamples {
@@ -129,20 +135,6 @@ class GraySoundness {
   std::vector<Blurred> blurred_;
   std::size_t frames_ = 0;
 };
-
-/// A peak over time as a decoder fits it: values above the ambient light, ambient light, width at half height divided
-/// by 2.355 (any unit).
-struct PeakSample {
-  double amplitude = 0, ambient = 0, width = 0;
-};
-
-/// The response value = light^(1 / gamma) that makes the beam equally wide at all pixels: under a curved response a
-/// peak that is high above the ambient light is wider (gamma > 1) than a low one. `std` is NaN where amplitudes and
-/// ambient light are too much alike to tell, or there are fewer than 100 samples.
-struct ResponseFit {
-  double gamma = SoundnessFigures::kNone, std = SoundnessFigures::kNone;
-};
-ResponseFit fit_response(std::vector<PeakSample> const& peaks);
 
 /// The sentence about a response, or nothing where gamma is 1 within 0.3 or too uncertain.
 std::string response_warning(std::string const& camera, double gamma, double std);

@@ -228,8 +228,8 @@ SoundnessFigures SweepSoundness::finish() {
                     "move",
                     list(figures.doubled)));
   if (!figures.missing.empty())
-    warn(fmt::format("a frame seems to be missing before frame {}: the light moves twice as far as usual",
-                     list(figures.missing)));
+    warn(
+        fmt::format("{} before frame {}: the light moves twice as far as usual", kMissingFrame, list(figures.missing)));
   if (!figures.out_of_order.empty())
     warn(fmt::format("frame {} is out of order: the light goes back and forth", list(figures.out_of_order)));
   if (figures.flicker > 0.04)

@@ -269,31 +269,6 @@ TEST(GraySoundness, FlickerAndOverexposureAreMeasured) {
   EXPECT_THAT(gray(bright).warnings, testing::Contains(HasSubstr("at full scale")));
 }
 
-TEST(FitResponse, WidthsThatGrowWithHeightMeanACurve) {
-  // Half-height widths of a Gaussian of width 2 under value = light^(1 / gamma), by solving for the half height.
-  for (double const gamma : {1.0, 2.2}) {
-    CounterRandom random(9, 1);
-    std::vector<PeakSample> peaks;
-    for (int i = 0; i < 3000; ++i) {
-      double const light = 0.05 + random.uniform(), ambient_light = 0.02 + 0.2 * random.uniform();
-      double const ambient = std::pow(ambient_light, 1 / gamma);
-      double const amplitude = std::pow(ambient_light + light, 1 / gamma) - ambient;
-      double const half = (std::pow(ambient + amplitude / 2, gamma) - ambient_light) / light;
-      double const width = 2 * std::sqrt(-2 * std::log(half)) / std::sqrt(2 * std::log(2.0));
-      peaks.push_back({amplitude, ambient, width * (1 + 0.02 * random.normal())});
-    }
-    auto const fit = fit_response(peaks);
-    ASSERT_TRUE(std::isfinite(fit.std));
-    EXPECT_NEAR(fit.gamma, gamma, 4 * fit.std + 0.02);
-    EXPECT_EQ(response_warning("left", fit.gamma, fit.std).empty(), gamma == 1);
-  }
-}
-
-TEST(FitResponse, EqualPeaksTellNothing) {
-  EXPECT_TRUE(std::isnan(fit_response(std::vector<PeakSample>(1000, {1, 0, 2})).std));
-  EXPECT_TRUE(std::isnan(fit_response({{1, 0.1, 2}}).gamma));
-}
-
 /// A picture with detail, at any place.
 double texture(double x, double y) {
   return 120 + 40 * std::sin(0.61 * x + 0.3 * y) + 35 * std::sin(0.17 * x - 0.52 * y) +
