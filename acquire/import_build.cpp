@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "acquire/sampling_error.h"
 #include "acquire/segment_background.h"
 #include "acquire/segment_cut.h"
 #include "acquire/segment_outliers.h"
@@ -16,17 +17,17 @@
 namespace scanview {
 namespace {
 
-/// About so many depths decide medians and quantiles of a whole set.
+/// About so many depths decide the median of a whole set.
 constexpr std::size_t kThinned = 1'000'000;
 
-std::vector<float> thinned(std::vector<View> const& views, cv::Mat1f RangeImage::*field) {
+std::vector<float> thinned_depths(std::vector<View> const& views) {
   std::size_t total = 0;
-  for (auto const& view : views) total += (view.image.*field).total();
+  for (auto const& view : views) total += view.image.depth.total();
   std::size_t const stride = std::max<std::size_t>(1, total / kThinned);
   std::vector<float> values;
   std::size_t index = 0;
   for (auto const& view : views)
-    for (float const value : view.image.*field)
+    for (float const value : view.image.depth)
       if (index++ % stride == 0 && std::isfinite(value)) values.push_back(value);
   return values;
 }
@@ -113,7 +114,7 @@ std::vector<View> load_views(BuildPlan const& plan, ImportOptions const& options
 }
 
 void give_sigma(ScanSet& set, BuildPlan const& plan, Context& context) {
-  auto depths = thinned(set.views, &RangeImage::depth);
+  auto depths = thinned_depths(set.views);
   DepthNoise noise = plan.noise(quantile(depths, 0.5));
   std::vector<RangeImage const*> images;
   for (auto const& view : set.views) images.push_back(&view.image);
@@ -126,12 +127,7 @@ void summarise(ImportResult& result) {
   result.depths = 0;
   for (auto const& view : set.views) result.depths += view.image.count_depths();
   set.center = median_center(set);
-  auto sigmas = thinned(set.views, &RangeImage::sigma);
-  if (sigmas.empty()) return;
-  double squares = 0;
-  for (double const s : sigmas) squares += s * s;
-  set.error_budget.sampling.rms = std::sqrt(squares / static_cast<double>(sigmas.size()));
-  set.error_budget.sampling.p95 = quantile(sigmas, 0.95);
+  set.error_budget.sampling = sampling_error(set);
 }
 
 }  // namespace

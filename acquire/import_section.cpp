@@ -1,161 +1,39 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <opencv2/imgproc.hpp>
-
 #include "acquire/import.h"
+#include "acquire/section_pictures.h"
 #include "base/html.h"
 
 namespace scanview {
-namespace {
-
-constexpr int kWidth = 200;             // CSS pixels of one picture
-constexpr int kPixels = 400;            // so that it is sharp on a fine screen
-constexpr std::size_t kMostViews = 40;  // shown in full; a page of thousands helps nobody
-
-cv::Mat small(cv::Mat const& image, int interpolation) {
-  if (image.cols <= kPixels) return image;
-  cv::Mat result;
-  cv::resize(image, result, {kPixels, std::max(1, image.rows * kPixels / image.cols)}, 0, 0, interpolation);
-  return result;
-}
-
-/// The part of the picture that holds depths, with a margin: an object fills little of what its camera sees.
-cv::Rect interesting(RangeImage const& image) {
-  cv::Rect const all({0, 0}, image.depth.size());
-  cv::Mat1b const object = image.classes == static_cast<int>(PixelClass::object);
-  if (cv::countNonZero(object) == 0) return all;
-  cv::Rect box = cv::boundingRect(object);
-  int const margin = std::max(8, std::max(box.width, box.height) / 10);
-  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) & all;
-}
-
-/// Green around what has a depth.
-cv::Mat3b outlined(cv::Mat3b const& color, cv::Mat1b const& classes) {
-  cv::Mat1b const object = classes == static_cast<int>(PixelClass::object);
-  cv::Mat1b border;
-  cv::morphologyEx(object, border, cv::MORPH_GRADIENT, cv::getStructuringElement(cv::MORPH_CROSS, {3, 3}));
-  cv::Mat3b picture = color.clone();
-  picture.setTo(cv::Scalar(60, 220, 60), border);
-  return picture;
-}
-
-/// `values` between low and high through a colour map; gray where missing.
-cv::Mat3b colored(cv::Mat1f const& values, double low, double high) {
-  cv::Mat1b scaled(values.size(), static_cast<std::uint8_t>(0));
-  for (int y = 0; y < values.rows; ++y)
-    for (int x = 0; x < values.cols; ++x)
-      if (std::isfinite(values(y, x)))
-        scaled(y, x) = cv::saturate_cast<std::uint8_t>(high > low ? 255 * (values(y, x) - low) / (high - low) : 128);
-  cv::Mat3b picture;
-  cv::applyColorMap(scaled, picture, cv::COLORMAP_TURBO);
-  picture.setTo(cv::Scalar::all(40), values != values);
-  return picture;
-}
-
-cv::Vec3b class_color(std::uint8_t value) {
-  switch (static_cast<PixelClass>(value)) {
-    case PixelClass::object:
-      return {240, 240, 240};
-    case PixelClass::background:
-      return {40, 40, 40};
-    case PixelClass::cut:
-      return {150, 90, 40};
-    case PixelClass::outlier:
-      return {40, 40, 220};
-    case PixelClass::no_depth:
-      return {40, 170, 230};
-    case PixelClass::no_light:
-      return {90, 60, 60};
-    case PixelClass::saturated:
-      return {120, 240, 250};
-    case PixelClass::several_peaks:
-      return {200, 60, 200};
-    case PixelClass::no_partner:
-      return {200, 140, 40};
-    case PixelClass::inconsistent:
-      return {60, 200, 90};
-  }
-  return {255, 0, 255};
-}
-
-cv::Mat3b class_picture(cv::Mat1b const& classes) {
-  cv::Mat3b picture(classes.size());
-  for (int y = 0; y < classes.rows; ++y)
-    for (int x = 0; x < classes.cols; ++x) picture(y, x) = class_color(classes(y, x));
-  return picture;
-}
-
-struct Quantiles {
-  double low = 0, middle = 0, high = 0;
-};
-
-Quantiles quantiles(cv::Mat1f const& values) {
-  std::vector<float> finite;
-  for (float const value : values)
-    if (std::isfinite(value)) finite.push_back(value);
-  if (finite.empty()) return {};
-  std::sort(finite.begin(), finite.end());
-  auto const at = [&](double share) {
-    return finite[static_cast<std::size_t>(share * static_cast<double>(finite.size() - 1))];
-  };
-  return {at(0.01), at(0.5), at(0.99)};
-}
-
-std::string legend() {
-  std::string html = "<p>Mask: ";
-  auto const entry = [&](PixelClass pixel, char const* meaning) {
-    cv::Vec3b const c = class_color(static_cast<std::uint8_t>(pixel));
-    html += fmt::format(
-        "<span style=\"display:inline-block;width:1em;height:1em;border:1px solid "
-        "#888;background:rgb({},{},{})\"></span> {} &nbsp; ",
-        c[2], c[1], c[0], meaning);
-  };
-  entry(PixelClass::object, "depth");
-  entry(PixelClass::no_depth, "no depth");
-  entry(PixelClass::outlier, "outlier");
-  entry(PixelClass::background, "background");
-  entry(PixelClass::cut, "cut");
-  return html + "</p>\n";
-}
-
-}  // namespace
 
 ReportSection import_section(ScanSet const& set) {
-  std::string const unit = set.unit == Unit::arbitrary ? std::string() : fmt::format(" {}", to_string(set.unit));
+  std::string const unit = unit_suffix(set.unit);
   std::string html = fmt::format(
       "<p>{} views. Each row: the picture with the outline of what has a depth; the depth, near blue and far red; what "
       "every pixel is; sigma, the standard deviation of each depth, from the sensor's physics scaled by the scatter "
       "that "
       "the data show. Over all views sigma is {:.3g}{} (rms), 95 % lie below {:.3g}{}.</p>\n",
       set.views.size(), set.error_budget.sampling.rms, unit, set.error_budget.sampling.p95, unit);
-  html += legend();
+  html += class_legend({{PixelClass::object, "depth"},
+                        {PixelClass::no_depth, "no depth"},
+                        {PixelClass::outlier, "outlier"},
+                        {PixelClass::background, "background"},
+                        {PixelClass::cut, "cut"}});
   std::vector<std::vector<std::string>> table{
       {"view", "size", "depths", "no depth", "outliers", "depth 1 % .. 99 %", "sigma median", "pose"}};
   std::size_t shown = 0;
   for (auto const& view : set.views) {
     auto const& image = view.image;
     auto const depth = quantiles(image.depth), sigma = quantiles(image.sigma);
-    auto const count = [&](PixelClass what) {
-      return std::to_string(cv::countNonZero(image.classes == static_cast<int>(what)));
-    };
+    auto const count = [&](PixelClass what) { return std::to_string(count_class(image, what)); };
     table.push_back({view.name, fmt::format("{}×{}", image.depth.cols, image.depth.rows), count(PixelClass::object),
                      count(PixelClass::no_depth), count(PixelClass::outlier),
                      fmt::format("{:.4g} .. {:.4g}{}", depth.low, depth.high, unit),
                      fmt::format("{:.3g}{}", sigma.middle, unit), view.object_from_camera ? "given" : "none"});
-    if (shown++ >= kMostViews) continue;
-    cv::Rect const frame = interesting(image);
-    html += html_row({html_jpeg(small(outlined(image.color(frame), image.classes(frame)), cv::INTER_AREA),
-                                fmt::format("view {}", view.name), kWidth),
-                      html_png(small(colored(image.depth(frame), depth.low, depth.high), cv::INTER_NEAREST),
-                               fmt::format("depth {:.4g} .. {:.4g}{}", depth.low, depth.high, unit), kWidth),
-                      html_png(small(class_picture(image.classes(frame)), cv::INTER_NEAREST), "mask", kWidth),
-                      html_png(small(colored(image.sigma(frame), 0, 2 * sigma.middle), cv::INTER_NEAREST),
-                               fmt::format("sigma 0 .. {:.3g}{}", 2 * sigma.middle, unit), kWidth)});
+    if (shown++ < kMostViewsShown) html += view_row(view, unit);
   }
-  if (set.views.size() > kMostViews)
-    html += fmt::format("<p>Pictures of the first {} views only; the table names all.</p>\n", kMostViews);
+  if (set.views.size() > kMostViewsShown)
+    html += fmt::format("<p>Pictures of the first {} views only; the table names all.</p>\n", kMostViewsShown);
   html += html_table(table);
   return {"import", "Views", html};
 }

@@ -19,9 +19,10 @@ struct StageTitle {
   char const* title;
 };
 /// In the order in which data flows.
-constexpr std::array kStages = {StageTitle{"synth", "Synthetic scan"}, StageTitle{"import", "Views"},
-                                StageTitle{"register", "Alignment"},   StageTitle{"mesh", "Meshes"},
-                                StageTitle{"render", "Pictures"},      StageTitle{"evaluate", "Held-out views"}};
+constexpr std::array kStages = {
+    StageTitle{"synth", "Synthetic scan"},   StageTitle{"acquire", "Views"}, StageTitle{"import", "Views"},
+    StageTitle{"register", "Alignment"},     StageTitle{"mesh", "Meshes"},   StageTitle{"render", "Pictures"},
+    StageTitle{"evaluate", "Held-out views"}};
 
 Json read_or_empty(fs::path const& path) {
   try {
@@ -44,7 +45,8 @@ std::string error_phrase(std::string const& stage, Json const& figures, Json con
   auto const part = [&](char const* name) {
     return length(budget.value(name, Json::object()).value("rms", Json()), unit);
   };
-  if (stage == "import" || stage == "synth") return "noise of a depth: " + part("sampling") + " RMS";
+  if (stage == "acquire" || stage == "import" || stage == "synth")
+    return "noise of a depth: " + part("sampling") + " RMS";
   if (stage == "register") return "distance between overlapping views: " + part("registration") + " RMS";
   if (stage == "mesh") return "distance from depths to mesh: " + part("approximation") + " RMS";
   if (stage == "evaluate" && figures.contains("renderers")) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "acquire/acquire.h"
 #include "acquire/import.h"
 #include "base/context.h"
 #include "base/html.h"
@@ -29,6 +30,12 @@ enum class StageMode {
   check    ///< change nothing; `was_up_to_date` tells whether it would work
 };
 
+struct AcquireRequest {
+  std::filesystem::path folder;    ///< where the pictures are
+  std::filesystem::path manifest;  ///< capture.json
+  AcquireOptions options;
+  bool measure_reading = false;  ///< also tell how long only reading the pictures takes
+};
 struct ImportRequest {
   std::string kind;  ///< rgbd, stanford, nerfstudio, colmap, or scanset (a copy of a set)
   std::filesystem::path input;
@@ -46,6 +53,8 @@ struct EvaluateRequest {
 
 /// A stage reads the set in `folder`, works, writes its output and its record, notes its time in timings.json and
 /// renews report.html. Each can be run again at any time; what an interrupted one left is replaced.
+StageOutcome acquire_stage(std::filesystem::path const& folder, AcquireRequest const& request, StageMode mode,
+                           Context& context);
 StageOutcome import_stage(std::filesystem::path const& folder, ImportRequest const& request, StageMode mode,
                           Context& context);
 StageOutcome register_stage(std::filesystem::path const& folder, RegisterRequest const& request, StageMode mode,

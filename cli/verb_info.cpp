@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "acquire/archive.h"
+#include "acquire/capture.h"
 #include "acquire/import.h"
 #include "acquire/rgbd_manifest.h"
 #include "acquire/scan_set_file.h"
@@ -90,7 +91,41 @@ Json info_rgbd(fs::path const& path) {
           {"fixed_camera", source.fixed_camera}};
 }
 
+Json info_capture(fs::path const& path) {
+  Capture const capture = read_capture(path, path.parent_path());
+  bool const gray = capture.pattern == Capture::Pattern::gray;
+  std::size_t missing = 0;
+  for (auto const& view : capture.views)
+    for (Side const side : kSides)
+      for (int k = 0; k < capture.frame_count(); ++k)
+        if (!fs::exists(capture.frame_path(view, side, k))) ++missing;
+  Json info = {{"kind", "capture"},
+               {"pattern", gray ? "gray" : "sweep"},
+               {"views", capture.views.size()},
+               {"frames", capture.frame_count()},
+               {"missing_frames", missing},
+               {"color", capture.color.has_value()},
+               {"empty_scene", capture.empty.has_value()},
+               {"backdrop", capture.backdrop.has_value()},
+               {"rig", capture.rig.has_value()},
+               {"intrinsics", capture.intrinsics.has_value()}};
+  if (gray) info.update({{"bits", capture.bits}, {"row_bits", capture.row_bits}});
+  fs::path const first = capture.frame_path(capture.views.front(), Side::left, 0);
+  if (fs::exists(first)) {
+    cv::Size const size = read_image(first).size();
+    info["width"] = size.width;
+    info["height"] = size.height;
+    if (capture.rig) {
+      StereoRig const rig = read_stereo_rig(capture.folder / *capture.rig, size);
+      info["baseline"] = rig.baseline();
+      info["unit"] = rig.unit;
+    }
+  }
+  return info;
+}
+
 Json info_json(fs::path const& path) {
+  if (path.filename() == "capture.json") return info_capture(path);
   if (path.filename() == "rgbd.json") return info_rgbd(path);
   Json const json = read_json(path);
   Json info = {{"kind", "JSON"}};
@@ -126,6 +161,7 @@ Json info(fs::path const& path, Context& context) {
   if (!fs::exists(path)) throw Error(ErrorCode::bad_input, path, "does not exist");
   if (fs::is_directory(path)) {
     if (fs::exists(path / "scanset.json")) return info_scan_set(path, context);
+    if (is_capture(path)) return info_capture(path / "capture.json");
     if (fs::exists(path / "rgbd.json")) return info_rgbd(path / "rgbd.json");
     std::string const kind = guess_import_kind(path);
     if (kind.empty())
@@ -173,7 +209,8 @@ void print(Json const& json, std::string const& indent) {
 void add_info(CLI::App& app, Session& session) {
   auto path = std::make_shared<fs::path>();
   CLI::App* verb = app.add_subcommand("info", "What is in a file or folder");
-  verb->add_option("path", *path, "Scan set, frames, mesh, picture, range image, record, archive ...")->required();
+  verb->add_option("path", *path, "Scan set, capture, frames, mesh, picture, range image, record, archive ...")
+      ->required();
   verb->callback([path, &session] {
     session.verb = "info";
     session.work = [path, &session] {
