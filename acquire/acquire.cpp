@@ -112,6 +112,8 @@ struct Geometry {
   }
 };
 
+constexpr double kRimShare = 0.6;  // of the light that a pixel farther in shows
+
 double median(std::vector<float>& values) {
   if (values.empty()) return 0;
   auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -119,9 +121,12 @@ double median(std::vector<float>& values) {
   return *middle;
 }
 
-RangeImage range_of_view(Geometry const& geometry, Decoded const& left, Decoded const& right, AcquiredView& figures,
+RangeImage range_of_view(Geometry const& geometry, Decoded& left, Decoded& right, AcquiredView& figures,
                          Context& context) {
-  CodeLinks const left_links = link_codes(left.image), right_links = link_codes(right.image);
+  CodeLinks left_links = link_codes(left.image);
+  CodeLinks right_links = link_codes(right.image);
+  judge_mixed(left.image, left_links, kRimShare);
+  judge_mixed(right.image, right_links, 0);
   CodeImage ideal = resample(left.image, left_links, geometry.left_map);
   CodeRows const left_rows(resample(left.image, left_links, geometry.left_row_map), context);
   CodeRows const right_rows(resample(right.image, right_links, geometry.right_row_map), context);

@@ -10,7 +10,11 @@ namespace {
 constexpr float kGentle = 3;
 constexpr float kSteep = 12;
 constexpr float kSigmas = 4;
-constexpr float kBendSigmas = 5;
+constexpr float kBendSigmas = 3;
+// A pixel whose paint changes by a share g from side to side has its light's middle off its own by g / 12 where paint
+// changes evenly, by up to g / 4 where it changes at once.
+constexpr float kPaintShift = 1.0F / 6;
+constexpr float kLeastFall = 0.3F;  // of the light, from one pixel to the next by the surface's turning away
 
 /// Median of |code(p + step) - code(p)| on every fourth row.
 float median_change(CodeImage const& image, int dx, int dy) {
@@ -79,10 +83,50 @@ CodeLinks link_codes(CodeImage const& image) {
   return links;
 }
 
+void judge_mixed(CodeImage& image, CodeLinks& links, double share) {
+  int const rows = image.code.rows, cols = image.code.cols;
+  cv::Mat1b drop(rows, cols, std::uint8_t{0});
+  for (int y = 2; y + 2 < rows; ++y)
+    for (int x = 2; x + 2 < cols; ++x) {
+      if (!image.has_code(x, y)) continue;
+      float least = 1;
+      // Along one axis, (dx, dy) its step: how far the light's middle is off the pixel's, times the code's slope.
+      auto const shift = [&](bool before, bool after, int dx, int dy) -> float {
+        float const here = image.lit(y, x);
+        if (before && after) {
+          float const change = 0.5F * (image.lit(y + dy, x + dx) - image.lit(y - dy, x - dx));
+          float const slope = 0.5F * (image.code(y + dy, x + dx) - image.code(y - dy, x - dx));
+          return kPaintShift * std::min(std::abs(change) / std::max(here, 1.0F), 1.0F) * std::abs(slope);
+        }
+        if (before == after) return 0;
+        int const sign = after ? 1 : -1;  // into the surface
+        float const near = image.lit(y + sign * dy, x + sign * dx),
+                    far = image.lit(y + 2 * sign * dy, x + 2 * sign * dx);
+        float const expected = std::max(near + std::min(near - far, 0.0F), kLeastFall * near);
+        float const left = expected > 0 ? std::min(here / expected, 1.0F) : 1;
+        least = std::min(least, left);
+        float const slope = std::abs(image.code(y, x) - image.code(y + sign * dy, x + sign * dx));
+        return 0.5F * (1 - left) * std::max(slope, static_cast<float>(links.slope));
+      };
+      float const along = shift(links.across(y, x - 1) != 0, links.across(y, x) != 0, 1, 0);
+      float const down = shift(links.down(y - 1, x) != 0, links.down(y, x) != 0, 0, 1);
+      drop(y, x) = least < share;
+      image.bias(y, x) = std::sqrt(image.bias(y, x) * image.bias(y, x) + along * along + down * down);
+    }
+  for (int y = 1; y + 1 < rows; ++y)
+    for (int x = 1; x + 1 < cols; ++x) {
+      if (!drop(y, x)) continue;
+      image.code(y, x) = image.sigma(y, x) = image.bias(y, x) = kMissing;
+      image.classes(y, x) = static_cast<std::uint8_t>(PixelClass::several_peaks);
+      links.across(y, x - 1) = links.across(y, x) = links.down(y - 1, x) = links.down(y, x) = 0;
+    }
+}
+
 CodeImage resample(CodeImage const& image, CodeLinks const& links, cv::Mat2f const& map) {
   CodeImage result;
   result.code = cv::Mat1f(map.size(), kMissing);
   result.sigma = cv::Mat1f(map.size(), kMissing);
+  result.bias = cv::Mat1f(map.size(), kMissing);
   result.classes = cv::Mat1b(map.size(), static_cast<std::uint8_t>(PixelClass::no_depth));
   int const rows = image.code.rows, cols = image.code.cols;
   auto const unknown_slope = static_cast<float>(links.slope);
@@ -110,7 +154,10 @@ CodeImage resample(CodeImage const& image, CodeLinks const& links, cv::Mat2f con
         // difference times a (1 - a).
         float const bend_x = a * (1 - a) * excess_bend(image.code[ny], image.sigma[ny], nx, cols);
         float const bend_y = b * (1 - b) * excess_bend_down(image, nx, ny);
-        result.sigma(y, x) = std::sqrt(noise + bend_x * bend_x + bend_y * bend_y);
+        float const *b0 = image.bias[j] + i, *b1 = image.bias[j + 1] + i;
+        float const inherited = w[0] * b0[0] + w[1] * b0[1] + w[2] * b1[0] + w[3] * b1[1];
+        result.sigma(y, x) = std::sqrt(noise);
+        result.bias(y, x) = std::sqrt(inherited * inherited + bend_x * bend_x + bend_y * bend_y);
         continue;
       }
       // The change along one axis: towards the place where that side is linked, else from the other side.
@@ -127,7 +174,8 @@ CodeImage resample(CodeImage const& image, CodeLinks const& links, cv::Mat2f con
                ny + 1 < rows ? image.code(ny + 1, nx) : kMissing, ny > 0 ? image.code(ny - 1, nx) : kMissing, dv);
       float const doubt = (std::isnan(along) ? std::abs(du) : 0) + (std::isnan(down) ? std::abs(dv) : 0);
       result.code(y, x) = code + (std::isnan(along) ? 0 : along) + (std::isnan(down) ? 0 : down);
-      result.sigma(y, x) = std::hypot(image.sigma(ny, nx) * (1 + std::abs(du) + std::abs(dv)), doubt * unknown_slope);
+      result.sigma(y, x) = image.sigma(ny, nx) * (1 + std::abs(du) + std::abs(dv));
+      result.bias(y, x) = std::hypot(image.bias(ny, nx), doubt * unknown_slope);
     }
   return result;
 }

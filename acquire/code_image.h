@@ -9,7 +9,8 @@ namespace scanview {
 /// plane's number or the projector's column, a real number. Equal codes in two cameras saw the same sheet of light.
 struct CodeImage {
   cv::Mat1f code;     ///< NaN where there is none
-  cv::Mat1f sigma;    ///< one standard deviation of the code; NaN likewise
+  cv::Mat1f sigma;    ///< one standard deviation of the code from the camera's noise; NaN likewise
+  cv::Mat1f bias;     ///< what it may be off by besides: mixed surfaces, interpolation over a bend; NaN likewise
   cv::Mat1b classes;  ///< PixelClass: object where there is a code, else why there is none
   cv::Mat1b lit;      ///< what the light showed of the surface: brightness above the ambient's, scaled to 8 bits
 
@@ -26,6 +27,12 @@ struct CodeLinks {
 /// A change between two neighbours is within one surface where it is at most `kGentle` times the median change plus
 /// four standard deviations, or at most `kSteep` times and like (within half) the change on one of its sides.
 CodeLinks link_codes(CodeImage const& image);
+
+/// Notes in `bias` by how much codes may be off because a pixel shows more than one thing. Where paint changes from
+/// side to side, the middle of its light is off the pixel's. At the rim of a surface a pixel shows less light than
+/// those farther in let expect (by the last two, linearly), since part of it is another surface: where less than
+/// `share` is left, that may be what is at the pixel's centre, and the code goes (several_peaks).
+void judge_mixed(CodeImage& image, CodeLinks& links, double share);
 
 /// |second difference| of the codes around pixel x of a line, beyond what noise explains: an interpolation over the
 /// pixel is off by up to an eighth of it. 0 where a neighbour is missing.

@@ -124,6 +124,7 @@ struct SpaceTimeDecoder::TypedState final : State {
     CodeImage image;
     image.code = cv::Mat1f(best.size(), kMissing);
     image.sigma = cv::Mat1f(best.size(), kMissing);
+    image.bias = cv::Mat1f(best.size(), kMissing);
     image.classes = cv::Mat1b(best.size());
     cv::Mat(best - least).convertTo(image.lit, CV_8U, 255 / kFull);
     auto const bands = static_cast<std::size_t>((best.rows + kBandRows - 1) / kBandRows);
@@ -131,8 +132,8 @@ struct SpaceTimeDecoder::TypedState final : State {
       int const first = static_cast<int>(band) * kBandRows;
       for (int y = first; y < std::min(first + kBandRows, best.rows); ++y)
         for (int x = 0; x < best.cols; ++x)
-          image.classes(y, x) =
-              static_cast<std::uint8_t>(decode(x, y, figures.noise, prior, image.code(y, x), image.sigma(y, x)));
+          image.classes(y, x) = static_cast<std::uint8_t>(
+              decode(x, y, figures.noise, prior, image.code(y, x), image.sigma(y, x), image.bias(y, x)));
     });
     return image;
   }
@@ -171,7 +172,8 @@ struct SpaceTimeDecoder::TypedState final : State {
     }
   }
 
-  PixelClass decode(int x, int y, PixelNoise const& noise, WidthPrior const& prior, float& code, float& sigma) const {
+  PixelClass decode(int x, int y, PixelNoise const& noise, WidthPrior const& prior, float& code, float& sigma,
+                    float& bias) const {
     if (!may_be_lit(x, y, noise)) return PixelClass::no_light;
     double const height = best(y, x) - least(y, x);
     bool const is_saturated = best(y, x) == std::numeric_limits<T>::max();
@@ -192,7 +194,8 @@ struct SpaceTimeDecoder::TypedState final : State {
     if (fit > kWorstFit) return failed;
     if (!(peak.time_sigma < 0.5)) return is_saturated ? PixelClass::saturated : PixelClass::no_light;
     code = static_cast<float>(time);
-    sigma = static_cast<float>(peak.time_sigma * (fit > kGoodFit ? std::sqrt(fit) : 1));
+    sigma = static_cast<float>(peak.time_sigma);
+    bias = static_cast<float>(fit > kGoodFit ? peak.time_sigma * std::sqrt(fit - 1) : 0);
     return PixelClass::object;
   }
 };

@@ -86,6 +86,7 @@ CodeImage StripeDecoder::finish() {
   CodeImage image;
   image.code = cv::Mat1f(brightest_.size(), kMissing);
   image.sigma = cv::Mat1f(brightest_.size(), kMissing);
+  image.bias = cv::Mat1f(brightest_.size(), kMissing);
   image.classes = cv::Mat1b(brightest_.size(), static_cast<std::uint8_t>(PixelClass::no_light));
   cv::Mat(brightest_ - least_).convertTo(image.lit, CV_8U);
   centres_ = cv::Mat1b(brightest_.size(), std::uint8_t{0});
@@ -118,6 +119,7 @@ CodeImage StripeDecoder::finish() {
         float const share = (static_cast<float>(x) - a.x) / (b.x - a.x);
         image.code(y, x) = static_cast<float>(a.frame) + slope * (static_cast<float>(x) - a.x);
         image.sigma(y, x) = std::abs(slope) * std::hypot((1 - share) * a.sigma, share * b.sigma);
+        image.bias(y, x) = 0;
         image.classes(y, x) = static_cast<std::uint8_t>(PixelClass::object);
         centres_(y, x) |= static_cast<float>(x) - a.x <= 0.5F || b.x - static_cast<float>(x) <= 0.5F;
       }

@@ -159,6 +159,7 @@ CodeImage interpolate(GrayBits const& bits, cv::Mat1i const& codes, cv::Mat1f co
   CodeImage image;
   image.code = cv::Mat1f(codes.size(), kMissing);
   image.sigma = cv::Mat1f(codes.size(), kMissing);
+  image.bias = cv::Mat1f(codes.size(), kMissing);
   image.classes = cv::Mat1b(codes.size());
   float const scatter = border_scatter(bits, codes, noise);
   std::vector<Border> borders;
@@ -170,6 +171,7 @@ CodeImage interpolate(GrayBits const& bits, cv::Mat1i const& codes, cv::Mat1f co
                               : codes(y, x) == -1 ? PixelClass::no_light
                                                   : PixelClass::several_peaks;
       image.classes(y, x) = static_cast<std::uint8_t>(what);
+      if (codes(y, x) >= 0) image.bias(y, x) = 0;
     }
   }
   return image;
@@ -248,6 +250,7 @@ CodeImage border_codes(GrayBits const& bits, cv::Mat1f const& noise_of_d, std::o
   CodeImage image = interpolate(transposed(bits), codes, noise_of_d.t());
   cv::transpose(image.code, image.code);
   cv::transpose(image.sigma, image.sigma);
+  cv::transpose(image.bias, image.bias);
   cv::transpose(image.classes, image.classes);
   return image;
 }

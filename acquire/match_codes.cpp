@@ -38,7 +38,7 @@ struct Partner {
   float x = 0;
   float sigma_x = 0;  // from the noise of the code there, in pixels
   float slope = 1;    // |d code / dx|
-  float lean = 0;     // doubt of x where one row alone has it, in pixels
+  float bias = 0;     // what x may be off by besides, in pixels
   bool is_leap = false;
 };
 struct Partners {
@@ -56,12 +56,14 @@ struct Partners {
     }
     count = kept;
   }
-  void add(float x, float code_sigma, float slope, float lean, bool is_leap) {
+  /// `lean`: doubt of x where one row alone has the place, in pixels.
+  void add(float x, float code_sigma, float code_bias, float slope, float lean, bool is_leap) {
     if (count == CodeRows::kMostPlaces) {
       overflow = true;
       return;
     }
-    partner[static_cast<std::size_t>(count++)] = {x, code_sigma / slope, slope, lean, is_leap};
+    partner[static_cast<std::size_t>(count++)] = {x, code_sigma / slope, slope, std::hypot(code_bias / slope, lean),
+                                                  is_leap};
   }
 };
 
@@ -83,17 +85,17 @@ Partners find_partners(CodeRows const& rows, float y, float code) {
       if (!used[static_cast<std::size_t>(j)] && distance < least) least = distance, best = j;
     }
     if (best < 0) {
-      result.add(a.x, a.sigma, a.slope, kOneRow * share, a.is_leap);
+      result.add(a.x, a.sigma, a.bias, a.slope, kOneRow * share, a.is_leap);
       continue;
     }
     used[static_cast<std::size_t>(best)] = true;
     CodePlace const& b = below.place[static_cast<std::size_t>(best)];
     result.add(a.x + share * (b.x - a.x), std::sqrt(between_variance(a.sigma, b.sigma, share)),
-               a.slope + share * (b.slope - a.slope), 0, a.is_leap || b.is_leap);
+               a.bias + share * (b.bias - a.bias), a.slope + share * (b.slope - a.slope), 0, a.is_leap || b.is_leap);
   }
   for (int j = 0; j < below.count; ++j) {
     CodePlace const& b = below.place[static_cast<std::size_t>(j)];
-    if (!used[static_cast<std::size_t>(j)]) result.add(b.x, b.sigma, b.slope, kOneRow * (1 - share), b.is_leap);
+    if (!used[static_cast<std::size_t>(j)]) result.add(b.x, b.sigma, b.bias, b.slope, kOneRow * (1 - share), b.is_leap);
   }
   return result;
 }
@@ -184,15 +186,17 @@ CodeRows::Places CodeRows::find(int row, float code) const {
       break;
     }
     float const slope = std::abs(change) / (e.to - e.from);
-    float noise = sigma[piece.x] * 1.5F;
-    if (piece.kind == Kind::leap) noise = kLeapSigma * slope;
+    float const* const bias = image_.bias[row];
+    CodePlace place{x, slope, sigma[piece.x] * 1.5F, bias[piece.x], piece.kind == Kind::leap};
+    if (piece.kind == Kind::leap) place.bias = kLeapSigma * slope;
     if (piece.kind == Kind::between) {
       float const bend = share * (1 - share) *
                          std::max(excess_bend(image_.code[row], sigma, piece.x, image_.code.cols),
                                   excess_bend(image_.code[row], sigma, piece.x + 1, image_.code.cols));
-      noise = std::sqrt(between_variance(sigma[piece.x], sigma[piece.x + 1], share) + bend * bend);
+      place.sigma = std::sqrt(between_variance(sigma[piece.x], sigma[piece.x + 1], share));
+      place.bias = std::hypot(bend, (1 - share) * bias[piece.x] + share * bias[piece.x + 1]);
     }
-    result.place[static_cast<std::size_t>(result.count++)] = {x, slope, noise, piece.kind == Kind::leap};
+    result.place[static_cast<std::size_t>(result.count++)] = place;
   }
   return result;
 }
@@ -348,12 +352,14 @@ class Matcher {
     partner.x += static_cast<float>(-0.5 * (low + high) / change);
     partner.slope = static_cast<float>(std::abs(change));
     partner.sigma_x = static_cast<float>(sheets.scatter() / std::abs(change));
+    partner.bias = 0;
     return true;
   }
   void take(int x, int y, Partner const& partner, double a) {
     disparity_(y, x) = disparity(a, partner.x);
-    float const own = left_.sigma(y, x) / partner.slope;
-    sigma_(y, x) = std::sqrt(partner.sigma_x * partner.sigma_x + own * own + partner.lean * partner.lean);
+    float const own = left_.sigma(y, x) / partner.slope, own_bias = left_.bias(y, x) / partner.slope;
+    sigma_(y, x) =
+        std::sqrt(partner.sigma_x * partner.sigma_x + own * own + partner.bias * partner.bias + own_bias * own_bias);
   }
   void set_class(int x, int y, PixelClass what) { image_.classes(y, x) = static_cast<std::uint8_t>(what); }
 

@@ -13,7 +13,8 @@ namespace scanview {
 struct CodePlace {
   float x = 0;
   float slope = 0;       ///< |d code / dx| there
-  float sigma = 0;       ///< of the code there
+  float sigma = 0;       ///< of the code there, from noise
+  float bias = 0;        ///< what the code there may be off by besides
   bool is_leap = false;  ///< between two pixels that are not linked: a surface seen at a grazing angle, or a step
 };
 

@@ -259,6 +259,22 @@ bool is_parallel(Covariance const& c, Estimate const& estimate, bool stereo, dou
   return false;
 }
 
+// Whether a camera alone cannot tell its focal length: its initial values are then nonsense, and no rig agrees.
+bool sees_parallel_boards(std::vector<BoardView> const& views, CalibrateOptions const& options, Side side) {
+  std::vector<BoardView> alone = views;
+  CalibrateOptions single = options;
+  for (BoardView& view : alone) {
+    if (side == Side::right) view.left = view.right;
+    view.right.clear();
+  }
+  if (side == Side::right) single.left_size = options.right_size;
+  Estimate estimate = start_values(alone, single).estimate;
+  Problem problem = make_problem(alone, single);
+  for (int k = kRight; k < kShared; ++k) problem.held[static_cast<std::size_t>(k)] = true;
+  polish(problem, estimate);
+  return is_parallel(covariance(problem, estimate), estimate, false, options.focal_limit);
+}
+
 }  // namespace
 
 void CalibrateOptions::validate() const {
@@ -297,7 +313,16 @@ Calibration calibrate(std::vector<BoardView> const& given, CalibrateOptions cons
 
   Start const start = start_values(views, options);
   Estimate estimate = start.estimate;
+  auto const refuse_parallel = [&] {
+    result.status = Status::parallel_boards;
+    result.reason =
+        "the focal length cannot be determined: all boards are nearly parallel to the picture; tilt them by some 30 "
+        "degrees, differently in each";
+    return result;
+  };
   if (result.stereo && 2 * start.agreeing <= start.common) {
+    if (sees_parallel_boards(views, options, Side::left) || sees_parallel_boards(views, options, Side::right))
+      return refuse_parallel();
     result.status = Status::inconsistent;
     result.reason = why_inconsistent(views, options, start);
     return result;
@@ -314,13 +339,7 @@ Calibration calibrate(std::vector<BoardView> const& given, CalibrateOptions cons
   }
   polish(problem, estimate);
   Covariance c = covariance(problem, estimate);
-  if (is_parallel(c, estimate, result.stereo, options.focal_limit)) {
-    result.status = Status::parallel_boards;
-    result.reason =
-        "the focal length cannot be determined: all boards are nearly parallel to the picture; tilt them by some 30 "
-        "degrees, differently in each";
-    return result;
-  }
+  if (is_parallel(c, estimate, result.stereo, options.focal_limit)) return refuse_parallel();
   hold_undetermined(problem, estimate, options, result.stereo, result.held);
   c = covariance(problem, estimate);
   result.status = Status::solved;

@@ -102,6 +102,10 @@ Calibration calibrate(std::vector<BoardView> const& views, CalibrateOptions cons
 /// squares. NaN where a lens has no inverse.
 double epipolar_distance(StereoRig const& rig, Eigen::Vector2d const& left, Eigen::Vector2d const& right);
 
+/// rig.yml: the rig, or where the left camera was calibrated alone M1, D1, its size and deviations only, which
+/// read_stereo_rig refuses. Whole or not at all.
+void write_calibration(std::filesystem::path const& path, Calibration const& calibration);
+
 std::string to_string(Calibration::Status status);
 
 }  // namespace scanview

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <numbers>
+#include <opencv2/core.hpp>
 
 #include "calib/calibrate.h"
 
@@ -58,6 +59,26 @@ Json Calibration::to_json() const {
       if (std::isfinite(board.holdout_px)) json["board_holdout_px"][board.name] = board.holdout_px;
   }
   return json;
+}
+
+void write_calibration(std::filesystem::path const& path, Calibration const& calibration) {
+  if (calibration.stereo) return write_stereo_rig(path, calibration.rig);
+  Camera const& camera = calibration.rig.left.camera;
+  Lens const& lens = calibration.rig.left.lens;
+  cv::FileStorage file(".yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+  file.writeComment("one camera, calibrated alone: not a stereo rig");
+  file << "image_width" << camera.width() << "image_height" << camera.height();
+  file << "M1" << cv::Mat(cv::Matx33d(camera.fx(), 0, camera.cx(), 0, camera.fy(), camera.cy(), 0, 0, 1));
+  file << "D1" << cv::Mat(cv::Matx<double, 1, 5>(lens.k1, lens.k2, lens.p1, lens.p2, lens.k3));
+  file << "standard_deviations"
+       << "{";
+  for (auto const& [dotted, value] : calibration.rig.standard_deviations) {
+    std::string name = dotted;
+    if (auto const at = name.find('.'); at != std::string::npos) name.replace(at, 1, 2, '_');
+    file << name << value;
+  }
+  file << "}";
+  write_file(path, file.releaseAndGetString());
 }
 
 std::string to_string(Calibration::Status status) {

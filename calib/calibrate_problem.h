@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <opencv2/core/types.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -81,6 +82,10 @@ struct Start {
   std::size_t agreeing = 0, common = 0;  ///< boards that both cameras saw: that agree on the rig, all
 };
 Start start_values(std::vector<BoardView> const& views, CalibrateOptions const& options);
+
+/// Pose of a board before one camera with a known lens.
+std::optional<Eigen::Isometry3d> pose_before(LensCamera const& camera, std::vector<BoardCorner> const& corners,
+                                             BoardDescription const& board);
 
 /// Chessboards whose colours do not tell how they are turned: the right view's ids follow the left's.
 void align_turns(std::vector<BoardView>& views, BoardDescription const& board);

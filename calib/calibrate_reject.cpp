@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace scanview {
 namespace {
@@ -111,6 +112,17 @@ Indices both(std::array<Indices, 2> const& view) {
   return all;
 }
 
+// The estimate with the pose of a board as one picture alone says it.
+Estimate from_one_picture(Estimate const& estimate, std::size_t board, Side side, BoardView const& view,
+                          CalibrateOptions const& options) {
+  Estimate result = estimate;
+  bool const left = side == Side::left;
+  auto const pose = pose_before(estimate.camera(side, left ? options.left_size : options.right_size),
+                                left ? view.left : view.right, options.board);
+  if (pose) result.poses[board] = to_vector(left ? *pose : estimate.right_from_left().inverse() * *pose);
+  return result;
+}
+
 }  // namespace
 
 void estimate_noise(Problem& problem, Estimate const& estimate, NoiseFrom from) {
@@ -158,6 +170,7 @@ void estimate_noise(Problem& problem, Estimate const& estimate, NoiseFrom from) 
 void reject(Problem& problem, Estimate& estimate, CalibrateOptions const& options, Context& context) {
   constexpr int kRounds = 8;
   auto const views = by_view(problem);
+  std::vector<PoseVector> const first = estimate.poses;
   for (int round = 0; round < kRounds; ++round) {
     context.check_cancelled();
     // The first noise is that of initial values, which are one camera's each: robust, and refined while solving.
@@ -167,8 +180,10 @@ void reject(Problem& problem, Estimate& estimate, CalibrateOptions const& option
     }
     estimate_noise(problem, estimate, NoiseFrom::median);
     for (std::size_t b = 0; b < views.size(); ++b)
-      if (!problem.board_used[b] && !(views[b][0].empty() && views[b][1].empty()))
+      if (!problem.board_used[b] && !(views[b][0].empty() && views[b][1].empty())) {
+        estimate.poses[b] = first[b];
         estimate.poses[b] = solve_pose(problem, estimate, b, both(views[b]));
+      }
     Verdict const before = current(problem);
     auto const limit = limits(problem, estimate, options, views);
     for (std::size_t b = 0; b < views.size(); ++b) {
@@ -197,12 +212,12 @@ std::string why_rejected(Problem const& problem, Estimate const& estimate, std::
   std::array<ViewFigures, 2> together, alone;
   std::array<bool, 2> bad = {false, false};
   Estimate fitted = estimate;
-  fitted.poses[board] = solve_pose(problem, estimate, board, both(view));
+  fitted.poses[board] = solve_pose(problem, fitted, board, both(view));
   for (std::size_t side = 0; side < 2; ++side) {
     together[side] = judge(problem, fitted, view[side], 1e6);
     if (view[side].empty()) continue;
-    Estimate single = estimate;
-    single.poses[board] = solve_pose(problem, fitted, board, view[side]);
+    Estimate single = from_one_picture(estimate, board, side == 0 ? Side::left : Side::right, views[board], options);
+    single.poses[board] = solve_pose(problem, single, board, view[side]);
     alone[side] = judge(problem, single, view[side], 1e6);
     bad[side] = fails(judge(problem, single, view[side], options.corner_limit), limit[side]);
   }
@@ -235,8 +250,7 @@ std::string why_rejected(Problem const& problem, Estimate const& estimate, std::
       o.on_board = options.board.corner(o.id);
       ++next;
     }
-    Estimate trial = estimate;
-    trial.poses[board] = solve_pose(problem, fitted, board, view[1 - side]);
+    Estimate trial = from_one_picture(estimate, board, side == 0 ? Side::right : Side::left, views[board], options);
     trial.poses[board] = solve_pose(flipped, trial, board, both(view));
     if (!fails(judge(flipped, trial, view[0], options.corner_limit), limit[0]) &&
         !fails(judge(flipped, trial, view[1], options.corner_limit), limit[1]))

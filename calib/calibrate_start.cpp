@@ -58,6 +58,19 @@ void usual_lens(CameraStart& start, cv::Size size) {
   start.distortion = cv::Mat1d::zeros(1, 5);
 }
 
+std::optional<Eigen::Isometry3d> solve_pnp(Points const& points, cv::Mat const& matrix, cv::Mat const& distortion) {
+  if (points.on_board.size() < 4) return std::nullopt;
+  try {
+    cv::Mat rotation, translation;
+    if (cv::solvePnP(points.on_board, points.in_picture, matrix, distortion, rotation, translation, false,
+                     cv::SOLVEPNP_ITERATIVE) &&
+        translation.at<double>(2) > 0)
+      return to_isometry(rotation, translation);
+  } catch (cv::Exception const&) {
+  }
+  return std::nullopt;
+}
+
 CameraStart start_camera(std::vector<std::vector<BoardCorner> const*> const& views, BoardDescription const& board,
                          cv::Size size) {
   constexpr std::size_t kFewest = 6;
@@ -86,15 +99,7 @@ CameraStart start_camera(std::vector<std::vector<BoardCorner> const*> const& vie
   }
   if (!good) usual_lens(start, size);
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (points[i].on_board.size() < 4) continue;
-    try {
-      cv::Mat rotation, translation;
-      if (cv::solvePnP(points[i].on_board, points[i].in_picture, start.matrix, start.distortion, rotation, translation,
-                       false, cv::SOLVEPNP_ITERATIVE) &&
-          translation.at<double>(2) > 0)
-        start.camera_from_board[i] = to_isometry(rotation, translation);
-    } catch (cv::Exception const&) {
-    }
+    start.camera_from_board[i] = solve_pnp(points[i], start.matrix, start.distortion);
   }
   return start;
 }
@@ -138,6 +143,14 @@ int turned_id(int id, int quarters, BoardDescription const& board) {
 }
 
 }  // namespace
+
+std::optional<Eigen::Isometry3d> pose_before(LensCamera const& camera, std::vector<BoardCorner> const& corners,
+                                             BoardDescription const& board) {
+  Camera const& c = camera.camera;
+  Lens const& l = camera.lens;
+  return solve_pnp(to_points(corners, board), cv::Mat(cv::Matx33d(c.fx(), 0, c.cx(), 0, c.fy(), c.cy(), 0, 0, 1)),
+                   cv::Mat(cv::Matx<double, 1, 5>(l.k1, l.k2, l.p1, l.p2, l.k3)));
+}
 
 void align_turns(std::vector<BoardView>& views, BoardDescription const& board) {
   if (board.kind != BoardDescription::Kind::chessboard) return;

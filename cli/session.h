@@ -29,6 +29,7 @@ struct Session {
 /// A verb adds itself to the command line and sets `work` when it is named.
 using AddVerb = void (*)(CLI::App&, Session&);
 
+void add_calibrate(CLI::App& app, Session& session);
 void add_acquire(CLI::App& app, Session& session);
 void add_import(CLI::App& app, Session& session);
 void add_register(CLI::App& app, Session& session);

@@ -9,7 +9,7 @@
 #include "base/files.h"
 #include "base/image_file.h"
 #include "base/parallel.h"
-#include "synth/board_pictures.h"
+#include "synth/chessboard.h"
 
 namespace scanview {
 namespace fs = std::filesystem;

@@ -7,8 +7,8 @@
 #include "acquire/scan_set_file.h"
 #include "base/files.h"
 #include "base/image_file.h"
-#include "synth/board_pictures.h"
 #include "synth/capture_files.h"
+#include "synth/chessboard.h"
 #include "synth/sensor.h"
 #include "tests/synth/shapes.h"
 #include "tests/temporary_folder.h"
@@ -108,7 +108,7 @@ TEST(GrayCode, PatternAndInverseSpellTheColumnMostSignificantBitFirst) {
   }
 }
 
-TEST(BoardPictures, CornersAreWhereTheRigProjectsThem) {
+TEST(Chessboard, CornersAreWhereTheRigProjectsThem) {
   TriangleMesh const ball = make_icosphere(Vector3d::Zero(), 40, 2);
   CaptureOptions options;
   options.sensor.full_scale_electrons = 0;

@@ -31,7 +31,8 @@ struct BoardPoses {
 /// fill about half the picture's width. Fewer poses where the rig does not see a board that fits (cameras far apart).
 BoardPoses make_board_poses(StereoRig const& rig, double distance, int count, std::uint64_t seed);
 
-/// The pictures that the left and the right camera take of board `index`: edges are integrated over the pixels.
+/// The pictures that the left and the right camera take of board `index`: edges are integrated over
+/// the pixels and softened by half a pixel, as no lens is perfectly sharp.
 std::array<cv::Mat, 2> take_board(StereoRig const& rig, BoardPoses const& poses, std::size_t index,
                                   Sensor const& sensor, Context& context);
 

@@ -1,8 +1,10 @@
-#include "synth/board_pictures.h"
+#include "synth/chessboard.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
 
 #include "base/parallel.h"
 #include "base/random.h"
@@ -18,20 +20,23 @@ using Eigen::Vector3d;
 constexpr double kMargin = 0.8;  // white around the squares, squares
 constexpr float kWhite = 0.80f, kBlack = 0.05f, kBehind = 0.22f;
 constexpr double kMaxTilt = 40, kMaxRoll = 30;
+constexpr double kLensBlur = 0.5;  // standard deviation, pixels
 constexpr int kTries = 400;
 constexpr int kEdgeSamples = 256;                   // in a pixel that an edge crosses
 constexpr std::uint64_t kBoardItem = 0x626f617264;  // keys the boards' random numbers
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
-/// Evenly spread over the unit square (the R2 sequence of Roberts 2018), centred.
+/// Evenly spread over the unit square (the R2 sequence of Roberts 2018), their mean in its centre.
 std::array<Vector2d, kEdgeSamples> spread_samples() {
   constexpr double kPlastic = 1.32471795724474602596;
   std::array<Vector2d, kEdgeSamples> samples;
   for (int i = 0; i < kEdgeSamples; ++i) {
     double const a = 0.5 + (i + 1) / kPlastic, b = 0.5 + (i + 1) / (kPlastic * kPlastic);
-    samples[i] = {a - std::floor(a) - 0.5, b - std::floor(b) - 0.5};
+    samples[i] = {a - std::floor(a), b - std::floor(b)};
   }
+  Vector2d const mean = std::accumulate(samples.begin(), samples.end(), Vector2d(0, 0)) / kEdgeSamples;
+  for (auto& sample : samples) sample -= mean;
   return samples;
 }
 
@@ -49,9 +54,9 @@ bool is_in_picture(LensCamera const& camera, Chessboard const& board, Isometry3d
 }
 
 /// Where a camera's rays meet the board's plane.
-class BoardView {
+class BoardPlane {
  public:
-  BoardView(LensCamera const& camera, Isometry3d const& camera_from_board)
+  BoardPlane(LensCamera const& camera, Isometry3d const& camera_from_board)
       : camera_(camera), board_from_camera_(camera_from_board.inverse()) {}
   Vector2d at(Vector2d const& pixel) const {
     Vector3d const origin = board_from_camera_.translation();
@@ -119,12 +124,11 @@ std::array<cv::Mat, 2> take_board(StereoRig const& rig, BoardPoses const& poses,
   for (int side = 0; side < 2; ++side) {
     LensCamera const& camera = side == 0 ? rig.left : rig.right;
     Isometry3d const pose = (side == 0 ? Isometry3d::Identity() : rig.right_from_left) * poses.left_from_board[index];
-    BoardView const view(camera, pose);
+    BoardPlane const view(camera, pose);
     int const width = camera.camera.width(), height = camera.camera.height();
-    pictures[side].create(height, width, sensor.type());
+    cv::Mat1f picture(height, width);
     for_each_index(context, static_cast<std::size_t>(height), [&](std::size_t row) {
       int const y = static_cast<int>(row);
-      std::vector<float> light(static_cast<std::size_t>(width));
       for (int x = 0; x < width; ++x) {
         std::array<Vector2d, 4> const corners = {view.at({x - 0.5, y - 0.5}), view.at({x + 0.5, y - 0.5}),
                                                  view.at({x - 0.5, y + 0.5}), view.at({x + 0.5, y + 0.5})};
@@ -150,12 +154,16 @@ std::array<cv::Mat, 2> take_board(StereoRig const& rig, BoardPoses const& poses,
                    kEdgeSamples;
           }
         }
-        light[x] = sum;
+        picture(y, x) = sum;
       }
-      sensor.expose(light.data(), width,
-                    CounterRandom(context.seed, kBoardItem + 1 + 2 * index + static_cast<std::size_t>(side), row),
-                    pictures[side].ptr(y));
     });
+    cv::GaussianBlur(picture, picture, {7, 7}, kLensBlur, kLensBlur, cv::BORDER_REPLICATE);
+    pictures[side].create(height, width, sensor.type());
+    for (int y = 0; y < height; ++y)
+      sensor.expose(picture[y], width,
+                    CounterRandom(context.seed, kBoardItem + 1 + 2 * index + static_cast<std::size_t>(side),
+                                  static_cast<std::uint64_t>(y)),
+                    pictures[side].ptr(y));
   }
   return pictures;
 }
