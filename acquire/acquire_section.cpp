@@ -51,7 +51,7 @@ std::string quality_table(AcquireResult const& result) {
   std::string const unit = unit_suffix(result.set.unit);
   std::vector<std::vector<std::string>> table = {{"view", "size", "depth 1 % .. 99 %", "sigma median", "angle of rays",
                                                   "beam left, right (steps)", "noise left, right (gray values)",
-                                                  "scatter of the light (codes)", "ambiguous", "rows agree"}};
+                                                  "scatter of the light (codes)", "ambiguous", "rows within 2"}};
   for (std::size_t v = 0; v < result.views.size(); ++v) {
     auto const& view = result.views[v];
     auto const& image = result.set.views[v].image;
@@ -62,9 +62,42 @@ std::string quality_table(AcquireResult const& result) {
          fmt::format("{:.3g}{}", view.sigma_median, unit), measured(view.angle_deg, "{:.1f}°"),
          view.beam_sigma[0] > 0 ? fmt::format("{:.2f}, {:.2f}", view.beam_sigma[0], view.beam_sigma[1]) : "",
          fmt::format("{:.2f}, {:.2f}", view.noise_read[0], view.noise_read[1]), measured(view.sheet_scatter, "{:.3f}"),
-         std::to_string(view.ambiguous), percent(view.row_agree, view.row_pairs)});
+         std::to_string(view.ambiguous), percent(view.row_pairs - view.row_off_2, view.row_pairs)});
   }
   return html_table(table);
+}
+
+std::string number(Json const& figures, char const* key, double scale, char const* format) {
+  auto const found = figures.find(key);
+  return found != figures.end() && found->is_number() ? fmt::format(fmt::runtime(format), scale * found->get<double>())
+                                                      : "";
+}
+
+/// Whether the pictures are what they should be, a row a camera and view.
+std::string soundness_table(AcquireResult const& result) {
+  std::vector<std::vector<std::string>> table = {
+      {"view", "camera", "lit", "saturated", "flicker", "gamma", "beam (steps)", "uneven steps", "rows off (px)"}};
+  for (auto const& view : result.views)
+    for (Side const side : kSides) {
+      auto const found = view.soundness.find(to_string(side));
+      if (found == view.soundness.end()) continue;
+      std::string const shift = side == Side::right && view.soundness.contains("rig")
+                                    ? number(view.soundness["rig"], "rms_px", 1, "{:.2f}")
+                                    : "";
+      table.push_back({view.name, to_string(side), number(*found, "lit_share", 100, "{:.0f} %"),
+                       number(*found, "saturated_share", 100, "{:.1f} %"), number(*found, "flicker", 100, "{:.1f} %"),
+                       number(*found, "gamma", 1, "{:.2f}"), number(*found, "beam_steps", 1, "{:.2f}"),
+                       number(*found, "step_scatter", 100, "{:.0f} %"), shift});
+    }
+  return table.size() > 1 ? "<p>Is the capture sound?</p>\n" + html_table(table) : "";
+}
+
+std::string warning_list(AcquireResult const& result) {
+  std::string items;
+  for (auto const& view : result.views)
+    for (auto const& warning : view.warnings)
+      items += fmt::format("<li>{}: {}</li>\n", html_escape(view.name), html_escape(warning));
+  return items.empty() ? "" : "<ul>\n" + items + "</ul>\n";
 }
 
 }  // namespace
@@ -94,6 +127,7 @@ ReportSection acquire_section(AcquireResult const& result) {
     html += fmt::format("<p>Pictures of the first {} views only; the tables name all.</p>\n", kMostViewsShown);
   html += "<p>Pixels without a depth, by the reason:</p>\n" + missing_table(result);
   html += "<p>What was measured:</p>\n" + quality_table(result);
+  html += soundness_table(result) + warning_list(result);
   return {"acquire", "Views", html};
 }
 

@@ -130,6 +130,8 @@ std::size_t count_class(RangeImage const& image, PixelClass pixel) {
   return static_cast<std::size_t>(cv::countNonZero(image.classes == static_cast<int>(pixel)));
 }
 
-std::string unit_suffix(Unit unit) { return unit == Unit::arbitrary ? std::string() : fmt::format(" {}", to_string(unit)); }
+std::string unit_suffix(Unit unit) {
+  return unit == Unit::arbitrary ? std::string() : fmt::format(" {}", to_string(unit));
+}
 
 }  // namespace scanview

@@ -34,6 +34,7 @@ class Stopwatch {
 
 Json to_json(AcquireOptions const& options) {
   Json json = {{"decoder", options.decoder == AcquireOptions::Decoder::stripe ? "stripe" : "space-time"},
+               {"refine_focal", options.refine_focal},
                {"use_rows", options.use_rows},
                {"row_tolerance", options.row_tolerance},
                {"min_depth", options.min_depth},
@@ -103,11 +104,14 @@ Json to_json(AcquiredView const& view, RangeImage const& image) {
           {"ambiguous", view.ambiguous},
           {"background_removed", view.background_removed},
           {"row_pairs", view.row_pairs},
-          {"row_agree", view.row_agree},
+          {"row_off_2", view.row_off_2},
+          {"row_off_4", view.row_off_4},
           {"sheet_scatter", view.sheet_scatter},
           {"angle_deg", view.angle_deg},
           {"beam_sigma", view.beam_sigma},
-          {"noise", {{"read", view.noise_read}, {"gain", view.noise_gain}}}};
+          {"noise", {{"read", view.noise_read}, {"gain", view.noise_gain}}},
+          {"soundness", view.soundness},
+          {"warnings", view.warnings}};
 }
 
 Json figures_of(Capture const& capture, AcquireResult const& result) {
@@ -121,6 +125,7 @@ Json figures_of(Capture const& capture, AcquireResult const& result) {
           {"depths", depths},
           {"unit", to_string(result.set.unit)},
           {"baseline", result.rig.baseline()},
+          {"relative_pose", result.relative_pose},
           {"pattern", capture.pattern == Capture::Pattern::gray ? "gray" : "sweep"},
           {"frames", capture.frame_count()}};
 }

@@ -13,6 +13,8 @@ void add_acquire_flags(CLI::App& verb, AcquireFlags& flags) {
   verb.add_option("--decoder", flags.decoder,
                   "Of a sweep: space-time (when each pixel was brightest) or stripe (where each frame was brightest)")
       ->check(CLI::IsMember({"space-time", "stripe"}));
+  verb.add_flag("--refine-focal", flags.options.refine_focal,
+                "Where the capture has intrinsics but no rig: find the focal length, too, if the scene tells it");
 }
 
 AcquireRequest resolve(AcquireFlags const& flags, fs::path const& capture, std::vector<std::string> const& settings) {

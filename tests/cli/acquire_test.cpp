@@ -1,8 +1,11 @@
 // A capture becomes a scan set: what is reported, what is resumed, what is refused.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <cmath>
 #include <csignal>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "acquire/scan_set_file.h"
@@ -14,13 +17,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A ball of 30 mm with three bulges around its axis, as OBJ: cheap to scan, and no two sides of a view alike.
+std::string blob() {
+  constexpr int kAround = 24, kDown = 12;
+  std::string obj;
+  for (int j = 0; j <= kDown; ++j)
+    for (int i = 0; i < kAround; ++i) {
+      double const theta = std::numbers::pi * j / kDown, phi = 2 * std::numbers::pi * i / kAround;
+      double const r = 30 + 4 * std::sin(3 * phi) * std::sin(theta);
+      obj += fmt::format("v {} {} {}\n", r * std::sin(theta) * std::cos(phi), r * std::sin(theta) * std::sin(phi),
+                         r * std::cos(theta));
+    }
+  for (int j = 0; j < kDown; ++j)
+    for (int i = 0; i < kAround; ++i) {
+      int const a = j * kAround + i + 1, b = j * kAround + (i + 1) % kAround + 1;
+      if (j > 0) obj += fmt::format("f {} {} {}\n", a, a + kAround, b);
+      if (j < kDown - 1) obj += fmt::format("f {} {} {}\n", b, a + kAround, b + kAround);
+    }
+  return obj;
+}
+
 class Acquire : public VerbTest {
  protected:
   static void SetUpTestSuite() {
     captures_ = new TemporaryFolder;
+    write_file(captures_->path() / "blob.obj", blob());
     CommandResult const synth =
-        run_scanview({"synth", "statuette", "-o", capture().string(), "--views", "2", "--size", "160x120", "--steps",
-                      "48", "--beam", "0.8step", "--boards", "0", "--quiet"});
+        run_scanview({"synth", (captures_->path() / "blob.obj").string(), "-o", capture().string(), "--views", "2",
+                      "--size", "160x120", "--steps", "48", "--beam", "0.8step", "--boards", "0", "--quiet"});
     ASSERT_EQ(synth.exit_code, 0) << synth.errors;
   }
   static void TearDownTestSuite() {
