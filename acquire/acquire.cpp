@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 
 constexpr double kRimShare = 0.6;     // of the light that a pixel farther in shows
 constexpr double kLeastAngleDeg = 1;  // between the two rays of a point
+constexpr double kNarrowBeam = 0.5;   // light steps
 constexpr int kAngleStep = 16;        // rows and columns, of the points whose angle is looked at
 
 using Sides = std::array<DecodedSide, 2>;
@@ -273,6 +274,13 @@ class Acquisition {
       }
     figures.depths = sigmas.size();
     figures.sigma_median = sigmas.empty() ? 0 : median(std::move(sigmas));
+    double const beam = std::min(figures.beam_sigma[0], figures.beam_sigma[1]);
+    if (beam > 0 && beam < kNarrowBeam)
+      figures.warnings.push_back(
+          fmt::format("the beam is {:.2f} light steps wide (standard deviation), too narrow to tell where it was "
+                      "between two frames "
+                      "(take smaller steps, or widen the beam to 0.8 steps or more)",
+                      beam));
     if (angles.empty()) return;
     figures.angle_deg = median(std::move(angles));
     if (figures.angle_deg < kLeastAngleDeg)

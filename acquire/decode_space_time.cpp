@@ -20,6 +20,8 @@ constexpr double kLightSigmas = 4.5;  // least height of a fitted peak
 constexpr double kSecondPeak = 0.7;   // of the first one's height
 constexpr double kGoodFit = 3;        // chi² a degree of freedom that is not questioned,
 constexpr double kWorstFit = 40;      // and that is no peak at all; between them sigma grows
+constexpr double kNarrowBeam = 0.5;   // steps; a narrower one has less than two frames in its peak,
+constexpr double kNarrowGuess = 0.3;  // and is off by up to half a step where it has one
 constexpr double kWidthShare = 0.5;   // a peak this much wider or narrower than most is none
 constexpr int kSampleStep = 5;        // rows and columns looked at for noise and width
 constexpr int kBandRows = 16;
@@ -174,7 +176,8 @@ struct SpaceTimeDecoder::TypedState final : State {
     if (!may_be_lit(x, y, noise)) return PixelClass::no_light;
     double const height = best(y, x) - least(y, x);
     bool const is_saturated = best(y, x) == std::numeric_limits<T>::max();
-    if (second(y, x) - least(y, x) > kSecondPeak * height) return PixelClass::several_peaks;
+    if (second(y, x) - least(y, x) > kSecondPeak * height)  // full scale for long is one peak, cut off
+      return second(y, x) == std::numeric_limits<T>::max() ? PixelClass::saturated : PixelClass::several_peaks;
     PeakSamples const s = samples(x, y);
     int usable = 0;
     for (int k = 0; k < kSpan; ++k) usable += s.usable[k];
@@ -192,7 +195,9 @@ struct SpaceTimeDecoder::TypedState final : State {
     if (!(peak.time_sigma < 0.5)) return is_saturated ? PixelClass::saturated : PixelClass::no_light;
     code = static_cast<float>(time);
     sigma = static_cast<float>(peak.time_sigma);
-    bias = static_cast<float>(fit > kGoodFit ? peak.time_sigma * std::sqrt(fit - 1) : 0);
+    // Of a beam much narrower than the step one frame alone tells, and where between two the peak was is a guess.
+    double const guess = kNarrowGuess * std::max(0.0, kNarrowBeam - prior.width);
+    bias = static_cast<float>(std::hypot(fit > kGoodFit ? peak.time_sigma * std::sqrt(fit - 1) : 0, guess));
     return PixelClass::object;
   }
 };
