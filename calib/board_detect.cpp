@@ -61,7 +61,7 @@ std::vector<cv::Point2f> search_chessboard(cv::Mat1b const& gray, cv::Size size,
   std::vector<cv::Point2f> corners;
   bool const found =
       sectors
-          ? cv::findChessboardCornersSB(gray, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE)
+          ? cv::findChessboardCornersSB(gray, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE)
           : cv::findChessboardCorners(gray, size, corners, cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE);
   if (!found || corners.size() != static_cast<std::size_t>(size.area())) corners.clear();
   return corners;

@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "base/parallel.h"
 #include "calib/calibrate_problem.h"
 #include "tests/calib/board_scene.h"
 #include "tests/expect_error.h"
@@ -126,9 +127,12 @@ TEST(Calibrate, GoodBoardsAllStay) {
 TEST(Calibrate, ErrorsAreWhatTheStandardDeviationsSay) {
   std::map<std::string, double> squares, counts;
   int const seeds = 50;
+  std::vector<Calibration> results(seeds);
+  Context context;
+  for_each_index(context, results.size(), [&](std::size_t i) { results[i] = solve_scene(board_scene(1000 + i)); });
   for (int seed = 0; seed < seeds; ++seed) {
     BoardScene const scene = board_scene(1000 + static_cast<std::uint64_t>(seed));
-    Calibration const result = solve_scene(scene);
+    Calibration const& result = results[static_cast<std::size_t>(seed)];
     ASSERT_EQ(result.status, Status::solved) << result.reason;
     auto const truth = true_values(scene.rig);
     for (Parameter const& p : result.parameters) {
