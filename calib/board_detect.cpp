@@ -59,10 +59,9 @@ cv::Mat1b stretched(cv::Mat1f const& gray) {
 
 std::vector<cv::Point2f> search_chessboard(cv::Mat1b const& gray, cv::Size size, bool sectors) {
   std::vector<cv::Point2f> corners;
-  bool const found =
-      sectors
-          ? cv::findChessboardCornersSB(gray, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE)
-          : cv::findChessboardCorners(gray, size, corners, cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE);
+  bool const found = sectors ? cv::findChessboardCornersSB(gray, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE)
+                             : cv::findChessboardCorners(gray, size, corners,
+                                                         cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE);
   if (!found || corners.size() != static_cast<std::size_t>(size.area())) corners.clear();
   return corners;
 }
