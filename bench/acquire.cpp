@@ -211,6 +211,13 @@ void print(Measured const& m) {
   std::cout.flush();
 }
 
+/// A plot as a file of its own, which needs to name its language.
+void write_plot(fs::path const& path, std::vector<PlotCurve> const& curves, PlotOptions const& options) {
+  std::string svg = svg_plot(curves, options);
+  svg.insert(4, " xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\" font-size=\"11\"");
+  write_file(path, svg);
+}
+
 /// How a run of Measured becomes a curve's point.
 template <class Value>
 PlotCurve curve(std::string const& name, std::string const& color, std::vector<Measured> const& all,
@@ -290,10 +297,10 @@ void measure_steps(Settings const& settings, Context& context) {
            curve("bound of one pixel", gray, all, [](Measured const& m) { return m.runs[0].depth.even_bound.rms(); })},
           {.x_label = "light steps", .y_label = "RMS depth error away from steps, mm", .log_x = true, .log_y = true}));
   auto const seconds_of = [](std::size_t d) { return [d](Measured const& m) { return m.runs[d].seconds; }; };
-  write_file(settings.output / "acquire_time.svg",
-             svg_plot({curve("space-time", blue, all, seconds_of(0)), curve("stripe", red, all, seconds_of(1)),
-                       curve("cv::imread alone", gray, all, [](Measured const& m) { return m.read_seconds; })},
-                      {.x_label = "light steps", .y_label = "seconds", .log_x = true, .log_y = true}));
+  write_plot(settings.output / "acquire_time.svg",
+             {curve("space-time", blue, all, seconds_of(0)), curve("stripe", red, all, seconds_of(1)),
+              curve("cv::imread alone", gray, all, [](Measured const& m) { return m.read_seconds; })},
+             {.x_label = "light steps", .y_label = "seconds", .log_x = true, .log_y = true});
 }
 
 int run(int argc, char** argv) {

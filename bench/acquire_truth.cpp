@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 constexpr int kSide = 4;  // rays a side of a pixel
 static_assert(kSide * kSide == kPacket);
 constexpr double kStep = 4;           // pixel widths of depth between neighbours: a surface seen under 76°, or a step
-constexpr double kBend = 0.25;        // pixel widths: second difference of depth over kAround pixels
+constexpr double kBend = 1;           // pixel widths: second difference of depth over kAround pixels
 constexpr double kPaintChange = 0.2;  // of the greater reflectance, between neighbours
 constexpr double kBeamReach = 6;      // widths
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
