@@ -26,8 +26,10 @@ namespace fs = std::filesystem;
 
 constexpr double kRimShare = 0.6;     // of the light that a pixel farther in shows
 constexpr double kLeastAngleDeg = 1;  // between the two rays of a point
-constexpr double kNarrowBeam = 0.5;   // light steps
-constexpr int kAngleStep = 16;        // rows and columns, of the points whose angle is looked at
+// Codes whose lines lean less than 6° from the epipolar ones: depth would be ten times as uncertain as across them.
+constexpr double kLeastAlongRows = 0.1;
+constexpr double kNarrowBeam = 0.5;  // light steps
+constexpr int kAngleStep = 16;       // rows and columns, of the points whose angle is looked at
 
 using Sides = std::array<DecodedSide, 2>;
 
@@ -155,6 +157,11 @@ class Acquisition {
       if (s == 0) ideal = resample(left.image, links, geometry.left_map);
     });
     auto const& [left_rows, right_rows] = rows;
+    if (right_rows.change_along_rows() < kLeastAlongRows)
+      throw Error(
+          ErrorCode::no_solution, capture_.folder / folder,
+          "the light runs along the epipolar lines: it cannot tell where on a line a point is (turn the light, or "
+          "the line between the cameras, by 90°)");
     if (!left.centres.empty()) keep_centres(ideal, left.centres, geometry.left_map);
     MatchFigures match;
     RangeImage image =

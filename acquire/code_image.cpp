@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "base/median.h"
+
 namespace scanview {
 namespace {
 
@@ -16,18 +18,20 @@ constexpr float kBendSigmas = 3;
 constexpr float kPaintShift = 1.0F / 6;
 constexpr float kLeastFall = 0.3F;  // of the light, from one pixel to the next by the surface's turning away
 
-/// Median of |code(p + step) - code(p)| on every fourth row.
-float median_change(CodeImage const& image, int dx, int dy) {
-  std::vector<float> changes;
+/// Changes code(p + step) - code(p) on every fourth row.
+std::vector<double> changes(CodeImage const& image, int dx, int dy) {
+  std::vector<double> result;
   for (int y = 0; y + dy < image.code.rows; y += 4)
     for (int x = 0; x + dx < image.code.cols; ++x) {
-      float const change = std::abs(image.code(y + dy, x + dx) - image.code(y, x));
-      if (std::isfinite(change)) changes.push_back(change);
+      double const change = image.code(y + dy, x + dx) - image.code(y, x);
+      if (std::isfinite(change)) result.push_back(change);
     }
-  if (changes.empty()) return 0;
-  auto const middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-  std::nth_element(changes.begin(), middle, changes.end());
-  return *middle;
+  return result;
+}
+
+double median_size(std::vector<double> values) {
+  for (double& value : values) value = std::abs(value);
+  return values.empty() ? 0 : median(std::move(values));
 }
 
 /// Whether the change from p to q is one of a surface; `before` and `after` are the changes on both sides of it (NaN
@@ -63,8 +67,10 @@ CodeLinks link_codes(CodeImage const& image) {
   int const rows = image.code.rows, cols = image.code.cols;
   links.across = cv::Mat1b(rows, cols, std::uint8_t{0});
   links.down = cv::Mat1b(rows, cols, std::uint8_t{0});
-  float const across = median_change(image, 1, 0), down = median_change(image, 0, 1);
-  float const typical = std::max(across, down);
+  auto const across = changes(image, 1, 0), down = changes(image, 0, 1);
+  auto const typical = static_cast<float>(std::max(median_size(across), median_size(down)));
+  links.across_change = across.empty() ? 0 : std::abs(median(across));
+  links.down_change = down.empty() ? 0 : std::abs(median(down));
   links.slope = typical;
   for (int y = 0; y < rows; ++y) {
     float const *const here = image.code[y], *const sigma = image.sigma[y];

@@ -22,6 +22,7 @@ struct CodeImage {
 struct CodeLinks {
   cv::Mat1b across, down;
   double slope = 0;  ///< median absolute change of the code from pixel to pixel, in the direction of faster change
+  double across_change = 0, down_change = 0;  ///< size of the median change in each direction; noise cancels
 };
 
 /// A change between two neighbours is within one surface where it is at most `kGentle` times the median change plus

@@ -142,7 +142,8 @@ struct SpaceTimeDecoder::TypedState final : State {
 
   /// Noise and the beam's width, from thinly sampled pixels: first with a guess, then with what that gave.
   void measure(SweepFigures& figures, WidthPrior& prior) {
-    figures.noise = {kFull / 255, 0.02 * kFull / 255};
+    double const level = kFull / 255;  // of 8 bits
+    figures.noise = {level * level, 0.02 * level};
     for (int round = 0; round < 2; ++round) {
       NoiseFit fit(kFull);
       std::vector<double> widths;
@@ -161,7 +162,7 @@ struct SpaceTimeDecoder::TypedState final : State {
           if (peak.height < 20 * std::sqrt(figures.noise.variance(peak.ambient))) continue;
           widths.push_back(peak.width);
         }
-      figures.noise = fit.solve();
+      figures.noise = fit.solve(figures.noise);  // with next to no light, the guess
       if (widths.empty()) return;
       auto const middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
       std::nth_element(widths.begin(), middle, widths.end());

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/median.h"
+
 namespace scanview {
 namespace {
 
@@ -15,12 +17,6 @@ constexpr std::size_t kKnots = 25;       // of the light's motion
 constexpr std::size_t kLeastAtKnot = 5;  // matches
 constexpr double kMostScatter = 0.03;    // of the range of codes
 constexpr double kSigmas = 5;
-
-double median(std::vector<double> values) {
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

@@ -105,6 +105,8 @@ Partners find_partners(CodeRows const& rows, float y, float code) {
 CodeRows::CodeRows(CodeImage rectified, Context& context) : image_(std::move(rectified)) {
   CodeLinks links = link_codes(image_);
   linked_ = links.across;
+  change_along_rows_ =
+      links.down_change > 0 ? links.across_change / links.down_change : std::numeric_limits<double>::infinity();
   float low = std::numeric_limits<float>::infinity(), high = -low;
   for (float const code : image_.code)
     if (std::isfinite(code)) low = std::min(low, code), high = std::max(high, code);

@@ -31,6 +31,9 @@ class CodeRows {
   CodeRows() = default;
   CodeRows(CodeImage rectified, Context& context);
   int rows() const { return image_.code.rows; }
+  /// Change of the code along a row over that from row to row; infinite where it does not change from row to row.
+  /// Near 0 the light runs along the rows, and a place on a row says nothing.
+  double change_along_rows() const { return change_along_rows_; }
   /// All places of a code on a row, from left to right. About two comparisons.
   Places find(int row, float code) const;
 
@@ -56,6 +59,7 @@ class CodeRows {
   std::vector<Row> rows_;
   float low_ = 0, buckets_per_code_ = 1, most_leap_ = 0;
   int buckets_ = 0;
+  double change_along_rows_ = 0;
 };
 
 struct MatchFigures {

@@ -24,7 +24,7 @@ void NoiseFit::add(NoiseFit const& other) {
     bins_[i].insert(bins_[i].end(), other.bins_[i].begin(), other.bins_[i].end());
 }
 
-PixelNoise NoiseFit::solve() const {
+PixelNoise NoiseFit::solve(PixelNoise const& otherwise) const {
   constexpr double kQuantisation = 1.0 / 12;
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -52,7 +52,7 @@ PixelNoise NoiseFit::solve() const {
     normal += weight * row * row.transpose();
     right += weight * variance * row;
   }
-  if (total < kLeast) return {};
+  if (total < kLeast) return otherwise;
   Eigen::Vector2d fit = normal.ldlt().solve(right);
   if (!fit.allFinite() || fit.y() < 0) fit = {right.x() / normal(0, 0), 0};
   if (fit.x() < kQuantisation)

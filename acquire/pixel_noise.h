@@ -20,8 +20,8 @@ class NoiseFit {
   void add(double brightness, double residual);
   void add(NoiseFit const& other);
   /// Weighted least squares over bins of brightness; each bin's variance from its residuals up to three medians, so
-  /// that outliers do not count. At least quantisation's 1/12; the default where there are fewer than 200 residuals.
-  PixelNoise solve() const;
+  /// that outliers do not count. At least quantisation's 1/12; `otherwise` where there are fewer than 200 residuals.
+  PixelNoise solve(PixelNoise const& otherwise = {}) const;
 
  private:
   static constexpr int kBins = 32;

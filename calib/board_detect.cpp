@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "calib/board_refine.h"
 
 namespace scanview {
@@ -23,12 +24,6 @@ using Layout = BoardDescription::Layout;
 constexpr int kMidSide = 1000;  // pixels: larger pictures are searched at this size first, which is quick and robust
 
 Vector2d to_eigen(cv::Point2f const& p) { return {static_cast<double>(p.x), static_cast<double>(p.y)}; }
-
-double median(std::vector<double> values) {
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 cv::Mat1f to_gray(cv::Mat const& picture) {
   if (picture.empty() || (picture.depth() != CV_8U && picture.depth() != CV_16U))

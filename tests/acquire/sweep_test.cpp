@@ -226,6 +226,13 @@ TEST(SpaceTimeDecoder, NothingInNothingOut) {
   EXPECT_EQ(count_of(dark.image, PixelClass::no_light), 200U);
 }
 
+TEST(SpaceTimeDecoder, NoiseAloneIsNoLight) {
+  // Of 12 values with a deviation of 1 level the range is below 6 levels in all but 0.1 % of pixels.
+  auto const dark = decode(
+      {20, 10}, 12, [](int, int, int) { return 10; }, 1);
+  EXPECT_GE(count_of(dark.image, PixelClass::no_light), 198U);
+}
+
 TEST(StripeDecoder, MiddlesOfStripesNameTheFrame) {
   StripeDecoder decoder;
   for (int k = 0; k < 32; ++k) {

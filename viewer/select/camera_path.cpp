@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "viewer/select/view_selection.h"
 
 namespace scanview {
@@ -17,12 +18,6 @@ using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
 double angle_between(Vector3d const& a, Vector3d const& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
-
-double median(std::vector<double> values) {
-  auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<Vector3d> view_directions(ScanSet const& set) {
   std::vector<Vector3d> result;
