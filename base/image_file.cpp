@@ -1,12 +1,11 @@
 #include "base/image_file.h"
 
-#include <zlib.h>
-
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
 #include "base/files.h"
+#include "base/gray_png.h"
 
 namespace scanview {
 namespace {
@@ -18,36 +17,10 @@ std::string encode(cv::Mat const& image, char const* extension, std::vector<int>
   return {bytes.begin(), bytes.end()};
 }
 
-bool starts_with(std::string const& bytes, std::string_view magic) {
-  return bytes.compare(0, magic.size(), magic) == 0;
-}
-
-std::uint32_t big_endian(std::string const& bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  for (std::size_t k = 0; k < 4; ++k) value = value << 8 | static_cast<unsigned char>(bytes[at + k]);
-  return value;
-}
-
-/// Every chunk with its checksum, up to IEND (PNG specification, section 5). Damage is found here and not by libpng,
-/// which would print about it.
-bool is_whole_png(std::string const& bytes) {
-  constexpr std::size_t kAround = 12;  // length, type, checksum
-  std::size_t at = 8;
-  while (bytes.size() - at >= kAround) {
-    std::size_t const length = big_endian(bytes, at);
-    if (length > bytes.size() - at - kAround) return false;
-    auto const* typed = reinterpret_cast<unsigned char const*>(bytes.data() + at + 4);
-    if (::crc32(0, typed, static_cast<uInt>(length + 4)) != big_endian(bytes, at + 8 + length)) return false;
-    if (bytes.compare(at + 4, 4, "IEND") == 0) return true;
-    at += kAround + length;
-  }
-  return false;
-}
-
 /// The decoders fill the missing rows of a truncated file with gray and report success.
 bool is_complete(std::string const& bytes) {
-  if (starts_with(bytes, "\x89PNG\r\n\x1a\n")) return is_whole_png(bytes);
-  if (starts_with(bytes, "\xff\xd8")) return bytes.rfind("\xff\xd9") != std::string::npos;
+  if (is_png(bytes)) return is_whole_png(bytes);
+  if (bytes.starts_with("\xff\xd8")) return bytes.rfind("\xff\xd9") != std::string::npos;
   return true;
 }
 
@@ -58,6 +31,10 @@ namespace {
 cv::Mat decode_file(std::filesystem::path const& path, int flags) {
   std::string const bytes = read_file(path);
   if (bytes.empty()) throw Error(ErrorCode::bad_input, path, "is empty");
+  if (auto gray = decode_gray_png(bytes)) {
+    if (gray->empty()) throw Error(ErrorCode::bad_input, path, "is truncated or damaged");
+    return *std::move(gray);
+  }
   if (!is_complete(bytes)) throw Error(ErrorCode::bad_input, path, "is truncated or damaged");
   cv::Mat image;
   try {

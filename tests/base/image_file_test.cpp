@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "base/files.h"
+#include "base/gray_png.h"
 #include "tests/expect_error.h"
 #include "tests/temporary_folder.h"
 
@@ -49,6 +51,49 @@ TEST(ImageFile, EveryTruncatedPictureIsRefused) {
       write_file(folder.path() / "cut", bytes.substr(0, n));
       EXPECT_SCANVIEW_ERROR(read_image(folder.path() / "cut"), ErrorCode::bad_input, "cut");
     }
+}
+
+/// Noise makes libpng choose among all five filters, from line to line.
+cv::Mat noisy(int type, int rows, int cols, int strength) {
+  cv::Mat image(rows, cols, type), noise(rows, cols, type);
+  cv::RNG random(7);
+  random.fill(noise, cv::RNG::UNIFORM, 0, strength);
+  for (int y = 0; y < rows; ++y) image.row(y).setTo(y * 3 % 200);
+  return image + noise;
+}
+
+TEST(GrayPng, IsWhatTheLibraryReads) {
+  for (int const type : {CV_8UC1, CV_16UC1})
+    for (int const strength : {1, 3, 50, 255})
+      for (auto const& size : {cv::Size(1, 1), cv::Size(1, 40), cv::Size(40, 1), cv::Size(63, 48)}) {
+        std::string const bytes = encode_png(noisy(type, size.height, size.width, strength));
+        auto const ours = decode_gray_png(bytes);
+        ASSERT_TRUE(ours);
+        cv::Mat const library =
+            cv::imdecode(std::vector<unsigned char>(bytes.begin(), bytes.end()), cv::IMREAD_UNCHANGED);
+        ASSERT_EQ(ours->type(), library.type());
+        EXPECT_EQ(cv::norm(*ours, library, cv::NORM_INF), 0);
+      }
+}
+
+TEST(GrayPng, OtherKindsAreLeftToTheLibrary) {
+  EXPECT_FALSE(decode_gray_png(encode_png(gradient(CV_8UC3))));
+  EXPECT_FALSE(decode_gray_png(encode_jpeg(gradient(CV_8UC1))));
+  EXPECT_FALSE(decode_gray_png(""));
+}
+
+TEST(GrayPng, AnyChangedByteIsFound) {
+  // Every byte but the eight of the magic number stands in a chunk's length, type, data or checksum. A changed length,
+  // or a changed kind of picture, makes it another file: then it is not read here, or refused.
+  cv::Mat const image = gradient(CV_16UC1);
+  std::string const good = encode_png(image);
+  for (std::size_t i = 8; i < good.size(); ++i) {
+    std::string bad = good;
+    bad[i] = static_cast<char>(bad[i] ^ 0x10);
+    auto const result = decode_gray_png(bad);
+    EXPECT_TRUE(!result || result->empty()) << "byte " << i;
+    EXPECT_FALSE(is_whole_png(bad)) << "byte " << i;
+  }
 }
 
 TEST(ImageFile, WhatIsNoPictureIsRefused) {
