@@ -37,13 +37,13 @@ using Sides = std::array<DecodedSide, 2>;
 struct Geometry {
   StereoRig rig;
   Rectification rectification;
-  cv::Mat2f left_map, left_row_map, right_row_map;
+  PictureMap left_map, left_row_map, right_row_map;
 
   Geometry(StereoRig const& of, Context& context) : rig(of), rectification(rectify(of)) {
     for_each_index(context, 3, [&](std::size_t i) {
-      if (i == 0) left_map = picture_map(rig.left.camera, Eigen::Matrix3d::Identity(), rig.left);
-      if (i == 1) left_row_map = picture_map(rectification.left, rectification.rectified_from_left, rig.left);
-      if (i == 2) right_row_map = picture_map(rectification.right, rectification.rectified_from_right, rig.right);
+      if (i == 0) left_map = PictureMap(rig.left.camera, Eigen::Matrix3d::Identity(), rig.left);
+      if (i == 1) left_row_map = PictureMap(rectification.left, rectification.rectified_from_left, rig.left);
+      if (i == 2) right_row_map = PictureMap(rectification.right, rectification.rectified_from_right, rig.right);
     });
   }
 };
@@ -147,16 +147,20 @@ class Acquisition {
       figures.warnings.insert(figures.warnings.end(), sound.warnings.begin(), sound.warnings.end());
     }
     auto& [left, right] = sides;
+    std::array<CodeLinks, 2> links;
     CodeImage ideal;
-    std::array<CodeRows, 2> rows;
+    CodeRows right_rows;
     for_each_index(context_, 2, [&](std::size_t s) {
-      CodeLinks links = link_codes(sides[s].image);
-      judge_mixed(sides[s].image, links, s == 0 ? kRimShare : 0);
-      rows[s] =
-          CodeRows(resample(sides[s].image, links, s == 0 ? geometry.left_row_map : geometry.right_row_map), context_);
-      if (s == 0) ideal = resample(left.image, links, geometry.left_map);
+      links[s] = link_codes(sides[s].image);
+      judge_mixed(sides[s].image, links[s], s == 0 ? kRimShare : 0);
+      if (s == 0)
+        ideal = resample(left.image, links[s], geometry.left_map, context_);
+      else
+        right_rows = CodeRows(resample(right.image, links[s], geometry.right_row_map, context_), context_);
     });
-    auto const& [left_rows, right_rows] = rows;
+    auto const left_rows = [&](int step) {
+      return CodeRows(resample(left.image, links[0], geometry.left_row_map, context_, step), context_);
+    };
     if (right_rows.change_along_rows() < kLeastAlongRows)
       throw Error(
           ErrorCode::no_solution, capture_.folder / folder,
@@ -176,11 +180,12 @@ class Acquisition {
   }
 
   /// The stripe decoder's own pixels: those that the middle of a stripe is in.
-  static void keep_centres(CodeImage& ideal, cv::Mat1b const& centres, cv::Mat2f const& map) {
+  static void keep_centres(CodeImage& ideal, cv::Mat1b const& centres, PictureMap const& map) {
     for (int y = 0; y < ideal.code.rows; ++y)
       for (int x = 0; x < ideal.code.cols; ++x) {
         if (!ideal.has_code(x, y)) continue;
-        if (centres(static_cast<int>(map(y, x)[1] + 0.5F), static_cast<int>(map(y, x)[0] + 0.5F)) != 0) continue;
+        cv::Vec2f const at = map.at(x, y);
+        if (centres(static_cast<int>(at[1] + 0.5F), static_cast<int>(at[0] + 0.5F)) != 0) continue;
         ideal.code(y, x) = kMissing;
         ideal.classes(y, x) = static_cast<std::uint8_t>(PixelClass::no_light);
       }
@@ -198,7 +203,7 @@ class Acquisition {
     for (int y = 0; y < image.depth.rows; ++y)
       for (int x = 0; x < image.depth.cols; ++x) {
         if (!image.has_depth(x, y)) continue;
-        auto const& at = geometry.left_map(y, x);
+        cv::Vec2f const at = geometry.left_map.at(x, y);
         int const a = left(static_cast<int>(at[1] + 0.5F), static_cast<int>(at[0] + 0.5F));
         Eigen::Vector2d const place = in_right(image, x, y, geometry);
         cv::Point const pixel(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y())));
@@ -217,8 +222,17 @@ class Acquisition {
                      Geometry const& geometry, AcquiredView& figures) {
     Rectification const& r = geometry.rectification;
     cv::Mat1b left, right;
-    cv::remap(lit_left, left, geometry.left_row_map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-    cv::remap(lit_right, right, geometry.right_row_map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    auto const whole = [](PictureMap const& map) {
+      cv::Mat2f all(map.size());
+      std::vector<cv::Vec2f> row;
+      for (int y = 0; y < all.rows; ++y) {
+        map.row(y, row);
+        std::copy(row.begin(), row.end(), all[y]);
+      }
+      return all;
+    };
+    cv::remap(lit_left, left, whole(geometry.left_row_map), cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    cv::remap(lit_right, right, whole(geometry.right_row_map), cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
     cv::Mat1f x_right(left.size(), kMissing);
     for (int y = 0; y < image.depth.rows; ++y)
       for (int x = 0; x < image.depth.cols; ++x) {

@@ -5,10 +5,13 @@
 #include <vector>
 
 #include "base/median.h"
+#include "base/parallel.h"
 
 namespace scanview {
 namespace {
 
+constexpr int kBandRows = 16;
+constexpr double kMostChanges = 1e5;  // pixels whose changes tell the usual one
 constexpr float kGentle = 3;
 constexpr float kSteep = 12;
 constexpr float kSigmas = 4;
@@ -18,11 +21,12 @@ constexpr float kBendSigmas = 3;
 constexpr float kPaintShift = 1.0F / 6;
 constexpr float kLeastFall = 0.3F;  // of the light, from one pixel to the next by the surface's turning away
 
-/// Changes code(p + step) - code(p) on every fourth row.
+/// Changes code(p + step) - code(p) at evenly spread pixels: their medians are known to a thousandth of a spread.
 std::vector<double> changes(CodeImage const& image, int dx, int dy) {
   std::vector<double> result;
-  for (int y = 0; y + dy < image.code.rows; y += 4)
-    for (int x = 0; x + dx < image.code.cols; ++x) {
+  int const stride = std::max(2, static_cast<int>(std::sqrt(static_cast<double>(image.code.total()) / kMostChanges)));
+  for (int y = 0; y + dy < image.code.rows; y += stride)
+    for (int x = 0; x + dx < image.code.cols; x += stride) {
       double const change = image.code(y + dy, x + dx) - image.code(y, x);
       if (std::isfinite(change)) result.push_back(change);
     }
@@ -128,61 +132,107 @@ void judge_mixed(CodeImage& image, CodeLinks& links, double share) {
     }
 }
 
-CodeImage resample(CodeImage const& image, CodeLinks const& links, cv::Mat2f const& map) {
-  CodeImage result;
-  result.code = cv::Mat1f(map.size(), kMissing);
-  result.sigma = cv::Mat1f(map.size(), kMissing);
-  result.bias = cv::Mat1f(map.size(), kMissing);
-  result.classes = cv::Mat1b(map.size(), static_cast<std::uint8_t>(PixelClass::no_depth));
-  int const rows = image.code.rows, cols = image.code.cols;
-  auto const unknown_slope = static_cast<float>(links.slope);
-  for (int y = 0; y < map.rows; ++y)
-    for (int x = 0; x < map.cols; ++x) {
-      float const u = map(y, x)[0], v = map(y, x)[1];
-      if (!(u >= -0.5F && v >= -0.5F && u < static_cast<float>(cols) - 0.5F && v < static_cast<float>(rows) - 0.5F))
-        continue;
-      int const nx = static_cast<int>(u + 0.5F), ny = static_cast<int>(v + 0.5F);
-      result.classes(y, x) = image.classes(ny, nx);
-      float const code = image.code(ny, nx);
-      if (std::isnan(code)) continue;
-      float const du = u - static_cast<float>(nx), dv = v - static_cast<float>(ny);
-      int const i = du < 0 ? nx - 1 : nx, j = dv < 0 ? ny - 1 : ny;  // the upper left of the four around
-      if (i >= 0 && j >= 0 && i + 1 < cols && j + 1 < rows && links.across(j, i) && links.across(j + 1, i) &&
-          links.down(j, i) && links.down(j, i + 1)) {
-        float const a = u - static_cast<float>(i), b = v - static_cast<float>(j);
-        float const w[4] = {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
-        float const *c0 = image.code[j] + i, *c1 = image.code[j + 1] + i;
-        float const *s0 = image.sigma[j] + i, *s1 = image.sigma[j + 1] + i;
-        result.code(y, x) = w[0] * c0[0] + w[1] * c0[1] + w[2] * c1[0] + w[3] * c1[1];
-        float const noise = w[0] * w[0] * s0[0] * s0[0] + w[1] * w[1] * s0[1] * s0[1] + w[2] * w[2] * s1[0] * s1[0] +
-                            w[3] * w[3] * s1[1] * s1[1];
-        // Where the surface bends, as at a crease, the plane through four codes is off by a quarter of a second
-        // difference times a (1 - a).
-        float const bend_x = a * (1 - a) * excess_bend(image.code[ny], image.sigma[ny], nx, cols);
-        float const bend_y = b * (1 - b) * excess_bend_down(image, nx, ny);
-        float const *b0 = image.bias[j] + i, *b1 = image.bias[j + 1] + i;
-        float const inherited = w[0] * b0[0] + w[1] * b0[1] + w[2] * b1[0] + w[3] * b1[1];
-        result.sigma(y, x) = std::sqrt(noise);
-        result.bias(y, x) = std::sqrt(inherited * inherited + bend_x * bend_x + bend_y * bend_y);
-        continue;
+namespace {
+
+/// What resample makes of one place (u, v) in the image.
+class Resampler {
+ public:
+  Resampler(CodeImage const& image, CodeLinks const& links)
+      : image_(image),
+        links_(links),
+        rows_(image.code.rows),
+        cols_(image.code.cols),
+        unknown_slope_(static_cast<float>(links.slope)) {}
+
+  struct Sample {
+    float code = kMissing, sigma = kMissing, bias = kMissing;
+    std::uint8_t what = static_cast<std::uint8_t>(PixelClass::no_depth);
+  };
+
+  Sample at(float u, float v) const {
+    Sample result;
+    if (!(u >= -0.5F && v >= -0.5F && u < static_cast<float>(cols_) - 0.5F && v < static_cast<float>(rows_) - 0.5F))
+      return result;
+    int const nx = static_cast<int>(u + 0.5F), ny = static_cast<int>(v + 0.5F);
+    result.what = image_.classes(ny, nx);
+    if (result.what != static_cast<std::uint8_t>(PixelClass::object)) return result;
+    float const du = u - static_cast<float>(nx), dv = v - static_cast<float>(ny);
+    int const i = du < 0 ? nx - 1 : nx, j = dv < 0 ? ny - 1 : ny;  // the upper left of the four around
+    if (i >= 0 && j >= 0 && i + 1 < cols_ && j + 1 < rows_ && links_.across(j, i) && links_.across(j + 1, i) &&
+        links_.down(j, i) && links_.down(j, i + 1))
+      between(u, v, i, j, nx, ny, result);
+    else
+      beside(du, dv, nx, ny, result);
+    return result;
+  }
+
+ private:
+  void between(float u, float v, int i, int j, int nx, int ny, Sample& result) const {
+    float const a = u - static_cast<float>(i), b = v - static_cast<float>(j);
+    float const w[4] = {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
+    float const *c0 = image_.code[j] + i, *c1 = image_.code[j + 1] + i;
+    float const *s0 = image_.sigma[j] + i, *s1 = image_.sigma[j + 1] + i;
+    float const *b0 = image_.bias[j] + i, *b1 = image_.bias[j + 1] + i;
+    result.code = w[0] * c0[0] + w[1] * c0[1] + w[2] * c1[0] + w[3] * c1[1];
+    float const noise = w[0] * w[0] * s0[0] * s0[0] + w[1] * w[1] * s0[1] * s0[1] + w[2] * w[2] * s1[0] * s1[0] +
+                        w[3] * w[3] * s1[1] * s1[1];
+    // Where the surface bends, as at a crease, the plane through four codes is off by a quarter of a second difference
+    // times a (1 - a).
+    float const bend_x = a * (1 - a) * excess_bend(image_.code[ny], image_.sigma[ny], nx, cols_);
+    float const bend_y = b * (1 - b) * excess_bend_down(image_, nx, ny);
+    float const inherited = w[0] * b0[0] + w[1] * b0[1] + w[2] * b1[0] + w[3] * b1[1];
+    result.sigma = std::sqrt(noise);
+    result.bias = std::sqrt(inherited * inherited + bend_x * bend_x + bend_y * bend_y);
+  }
+
+  /// From the nearest pixel along its slopes.
+  void beside(float du, float dv, int nx, int ny, Sample& result) const {
+    float const code = image_.code(ny, nx);
+    // The change along one axis: towards the place where that side is linked, else from the other side.
+    auto const step = [&](bool linked_after, bool linked_before, float after, float before, float distance) {
+      bool const ahead = distance >= 0 ? linked_after : !linked_before && linked_after;
+      if (ahead) return (after - code) * distance;
+      return linked_before ? (code - before) * distance : kMissing;
+    };
+    float const along =
+        step(nx + 1 < cols_ && links_.across(ny, nx), nx > 0 && links_.across(ny, nx - 1),
+             nx + 1 < cols_ ? image_.code(ny, nx + 1) : kMissing, nx > 0 ? image_.code(ny, nx - 1) : kMissing, du);
+    float const down =
+        step(ny + 1 < rows_ && links_.down(ny, nx), ny > 0 && links_.down(ny - 1, nx),
+             ny + 1 < rows_ ? image_.code(ny + 1, nx) : kMissing, ny > 0 ? image_.code(ny - 1, nx) : kMissing, dv);
+    float const doubt = (std::isnan(along) ? std::abs(du) : 0) + (std::isnan(down) ? std::abs(dv) : 0);
+    result.code = code + (std::isnan(along) ? 0 : along) + (std::isnan(down) ? 0 : down);
+    result.sigma = image_.sigma(ny, nx) * (1 + std::abs(du) + std::abs(dv));
+    result.bias = std::hypot(image_.bias(ny, nx), doubt * unknown_slope_);
+  }
+
+  CodeImage const& image_;
+  CodeLinks const& links_;
+  int rows_, cols_;
+  float unknown_slope_;
+};
+
+}  // namespace
+
+CodeImage resample(CodeImage const& image, CodeLinks const& links, PictureMap const& map, Context& context, int step) {
+  cv::Size const size(map.size().width, (map.size().height + step - 1) / step);
+  CodeImage result{cv::Mat1f(size), cv::Mat1f(size), cv::Mat1f(size), cv::Mat1b(size), {}};
+  Resampler const resampler(image, links);
+  auto const bands = static_cast<std::size_t>((size.height + kBandRows - 1) / kBandRows);
+  for_each_index(context, bands, [&](std::size_t band) {
+    std::vector<cv::Vec2f> places;
+    int const first = static_cast<int>(band) * kBandRows;
+    for (int y = first; y < std::min(first + kBandRows, size.height); ++y) {
+      map.row(y * step, places);
+      float *const code = result.code[y], *const sigma = result.sigma[y], *const bias = result.bias[y];
+      std::uint8_t* const classes = result.classes[y];
+      for (int x = 0; x < size.width; ++x) {
+        cv::Vec2f const& place = places[static_cast<std::size_t>(x)];
+        Resampler::Sample const sample = resampler.at(place[0], place[1]);
+        code[x] = sample.code, sigma[x] = sample.sigma, bias[x] = sample.bias, classes[x] = sample.what;
       }
-      // The change along one axis: towards the place where that side is linked, else from the other side.
-      auto const step = [&](bool linked_after, bool linked_before, float after, float before, float distance) {
-        bool const ahead = distance >= 0 ? linked_after : !linked_before && linked_after;
-        if (ahead) return (after - code) * distance;
-        return linked_before ? (code - before) * distance : kMissing;
-      };
-      float const along =
-          step(nx + 1 < cols && links.across(ny, nx), nx > 0 && links.across(ny, nx - 1),
-               nx + 1 < cols ? image.code(ny, nx + 1) : kMissing, nx > 0 ? image.code(ny, nx - 1) : kMissing, du);
-      float const down =
-          step(ny + 1 < rows && links.down(ny, nx), ny > 0 && links.down(ny - 1, nx),
-               ny + 1 < rows ? image.code(ny + 1, nx) : kMissing, ny > 0 ? image.code(ny - 1, nx) : kMissing, dv);
-      float const doubt = (std::isnan(along) ? std::abs(du) : 0) + (std::isnan(down) ? std::abs(dv) : 0);
-      result.code(y, x) = code + (std::isnan(along) ? 0 : along) + (std::isnan(down) ? 0 : down);
-      result.sigma(y, x) = image.sigma(ny, nx) * (1 + std::abs(du) + std::abs(dv));
-      result.bias(y, x) = std::hypot(image.bias(ny, nx), doubt * unknown_slope);
     }
+  });
   return result;
 }
 

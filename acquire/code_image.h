@@ -2,6 +2,8 @@
 #include <opencv2/core/mat.hpp>
 
 #include "acquire/range_image.h"
+#include "acquire/rectification.h"
+#include "base/context.h"
 
 namespace scanview {
 
@@ -41,7 +43,9 @@ float excess_bend(float const* code, float const* sigma, int x, int count);
 
 /// The codes at other places: for every pixel of the result, `map` says where it lies in `image` (NaN: nowhere).
 /// Bilinear between four pixels that are linked; else from the nearest pixel along the slope on the side that is
-/// linked, so that codes of two surfaces never mix. The class is that of the nearest pixel. `lit` is left empty.
-CodeImage resample(CodeImage const& image, CodeLinks const& links, cv::Mat2f const& map);
+/// linked, so that codes of two surfaces never mix. The class is that of the nearest pixel. `lit` is left empty. With a
+/// `step`, only every so many rows of the map, one below the other.
+CodeImage resample(CodeImage const& image, CodeLinks const& links, PictureMap const& map, Context& context,
+                   int step = 1);
 
 }  // namespace scanview

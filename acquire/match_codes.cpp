@@ -12,20 +12,21 @@ namespace scanview {
 namespace {
 
 constexpr int kBandRows = 16;
-constexpr float kJoin = 2;               // pixels: places on neighbouring rows that are one line of the light
-constexpr int kSampleStep = 3;           // rows and columns, of the matches that tell of the light
-constexpr float kLeastDisparity = 0.5F;  // pixels; beyond that depth means nothing
-constexpr float kSelf = 1.5F;            // pixels: a partner's partner within this is the pixel itself
-constexpr float kNear = 2;               // pixels of disparity from what the surroundings agree on
-constexpr int kAround = 3;               // pixels each way: the surroundings
-constexpr int kLeastAround = 5;          // of them with one partner
-constexpr int kSupport = 2;              // of eight neighbours
-constexpr float kOneRow = 0.25F;         // pixels a row that a line of light may lean, where only one row has it
-constexpr float kShared = 0.25F;         // correlation of neighbours after bilinear resampling (mean over phases)
-constexpr double kMostLeap = 40;         // median changes of the code from pixel to pixel
-constexpr double kLeapReach = 0.7;       // pixels each way, in which a leap is set right
-constexpr float kLeapSigma = 0.29F;      // pixels: anywhere between two
-constexpr int kMostBuckets = 1 << 15;    // of codes on a row
+constexpr float kJoin = 2;                   // pixels: places on neighbouring rows that are one line of the light
+constexpr int kSampleStep = 3;               // rows and columns, of the matches that tell of the light,
+constexpr std::size_t kMostSamples = 20000;  // and how many of them: seven parameters and 25 knots have enough
+constexpr float kLeastDisparity = 0.5F;      // pixels; beyond that depth means nothing
+constexpr float kSelf = 1.5F;                // pixels: a partner's partner within this is the pixel itself
+constexpr float kNear = 2;                   // pixels of disparity from what the surroundings agree on
+constexpr int kAround = 3;                   // pixels each way: the surroundings
+constexpr int kLeastAround = 5;              // of them with one partner
+constexpr int kSupport = 2;                  // of eight neighbours
+constexpr float kOneRow = 0.25F;             // pixels a row that a line of light may lean, where only one row has it
+constexpr float kShared = 0.25F;             // correlation of neighbours after bilinear resampling (mean over phases)
+constexpr double kMostLeap = 40;             // median changes of the code from pixel to pixel
+constexpr double kLeapReach = 0.7;           // pixels each way, in which a leap is set right
+constexpr float kLeapSigma = 0.29F;          // pixels: anywhere between two
+constexpr int kMostBuckets = 1 << 15;        // of codes on a row
 
 /// Variance of a linear interpolation between two values that share noise.
 float between_variance(float a, float b, float share) {
@@ -208,10 +209,8 @@ namespace {
 /// The work of match_codes, row by row.
 class Matcher {
  public:
-  Matcher(CodeImage const& left, CodeRows const& left_rows, CodeRows const& right_rows,
-          Rectification const& rectification, Camera const& camera)
+  Matcher(CodeImage const& left, CodeRows const& right_rows, Rectification const& rectification, Camera const& camera)
       : left_(left),
-        left_rows_(left_rows),
         right_rows_(right_rows),
         rectification_(rectification),
         camera_(camera),
@@ -226,19 +225,28 @@ class Matcher {
     Partners partners;
   };
 
-  /// Thinly sampled pixels that have one partner which has one partner: what tells of the light.
-  void sample_row(int y, std::vector<LightSheets::Match>& matches) const {
-    for (int x = 0; x < camera_.width(); x += kSampleStep) {
-      if (std::isnan(left_.code(y, x))) continue;
-      Eigen::Vector2d const at = rectified(x, y);
-      Partners const partners = partners_of(x, y, at);
-      if (partners.count == 1 && !partners.overflow && !partners.partner[0].is_leap && !has_rivals(x, y, at))
-        matches.push_back(place(x, y, at, partners.partner[0]));
+  /// Thinly sampled pixels of row `i` of the left rectified rows (every kSampleStep-th of the picture) that have one
+  /// partner and no rival: what tells of the light.
+  void sample_row(CodeRows const& left_rows, int i, std::vector<LightSheets::Match>& matches) const {
+    int const y = i * kSampleStep;
+    if (y >= right_rows_.rows()) return;
+    CodeImage const& codes = left_rows.image();
+    for (int x = 0; x < codes.code.cols; x += kSampleStep) {
+      float const code = codes.code(i, x);
+      if (std::isnan(code)) continue;
+      Eigen::Vector2d const at = rectification_.left.ray_direction(x, y).head<2>();
+      CodeRows::Places const there = right_rows_.find(y, code);
+      if (there.count != 1 || there.overflow || there.place[0].is_leap) continue;
+      CodePlace const& partner = there.place[0];
+      float const d = disparity(at.x(), partner.x);
+      if (!(d > kLeastDisparity) || has_rivals(left_rows, i, static_cast<float>(x), code)) continue;
+      matches.push_back({at.x(), at.y(), d, code, std::hypot(codes.sigma(i, x), partner.sigma)});
     }
   }
 
   /// Disparities of what has one partner; pixels with several go to `doubts`.
-  void match_row(int y, LightSheets const& sheets, std::vector<Doubt>& doubts) {
+  /// `left_rows`: all of them, needed only where the sheets are not usable.
+  void match_row(int y, LightSheets const& sheets, CodeRows const& left_rows, std::vector<Doubt>& doubts) {
     for (int x = 0; x < camera_.width(); ++x) {
       if (std::isnan(left_.code(y, x))) continue;
       Eigen::Vector2d const at = rectified(x, y);
@@ -250,7 +258,8 @@ class Matcher {
         partners.keep_if([&](Partner& partner) { return agrees(x, y, at, sheets, partner); });
       } else {
         partners.keep_if([](Partner const& partner) { return !partner.is_leap; });
-        in_doubt = in_doubt || has_rivals(x, y, at);
+        auto const self = static_cast<float>(rectification_.left.fx() * at.x() + rectification_.left.cx());
+        in_doubt = in_doubt || has_rivals(left_rows, row_of(at), self, left_.code(y, x));
       }
       if (partners.count == 1 && !in_doubt) {
         take(x, y, partners.partner[0], at.x());
@@ -329,12 +338,17 @@ class Matcher {
     partners.keep_if([&](Partner const& partner) { return disparity(at.x(), partner.x) > kLeastDisparity; });
     return partners;
   }
-  /// Whether the left camera sees the same code elsewhere on the epipolar line.
-  bool has_rivals(int x, int y, Eigen::Vector2d const& at) const {
-    auto const self = static_cast<float>(rectification_.left.fx() * at.x() + rectification_.left.cx());
-    Partners const own = find_partners(left_rows_, row_of(at), left_.code(y, x));
+  /// Whether the left camera sees the same code elsewhere on the epipolar line than at x = `self`.
+  static bool has_rivals(CodeRows const& left_rows, float row, float self, float code) {
+    Partners const own = find_partners(left_rows, row, code);
     bool rivals = own.overflow;
     for (int i = 0; i < own.count; ++i) rivals |= std::abs(own.partner[static_cast<std::size_t>(i)].x - self) > kSelf;
+    return rivals;
+  }
+  static bool has_rivals(CodeRows const& left_rows, int row, float self, float code) {
+    CodeRows::Places const own = left_rows.find(row, code);
+    bool rivals = own.overflow;
+    for (int i = 0; i < own.count; ++i) rivals |= std::abs(own.place[static_cast<std::size_t>(i)].x - self) > kSelf;
     return rivals;
   }
   LightSheets::Match place(int x, int y, Eigen::Vector2d const& at, Partner const& partner) const {
@@ -366,19 +380,35 @@ class Matcher {
   void set_class(int x, int y, PixelClass what) { image_.classes(y, x) = static_cast<std::uint8_t>(what); }
 
   CodeImage const& left_;
-  CodeRows const &left_rows_, &right_rows_;
+  CodeRows const& right_rows_;
   Rectification const& rectification_;
   Camera const& camera_;
   RangeImage image_;
   cv::Mat1f disparity_, sigma_;  // in pixels of the rectified right picture
 };
 
+std::vector<LightSheets::Match> sample_matches(Matcher const& matcher, CodeRows const& left_rows, Context& context) {
+  std::vector<std::vector<LightSheets::Match>> samples(
+      static_cast<std::size_t>((left_rows.rows() + kBandRows - 1) / kBandRows));
+  for_each_index(context, samples.size(), [&](std::size_t band) {
+    int const first = static_cast<int>(band) * kBandRows;
+    for (int i = first; i < std::min(first + kBandRows, left_rows.rows()); ++i)
+      matcher.sample_row(left_rows, i, samples[band]);
+  });
+  std::vector<LightSheets::Match> matches;
+  for (auto const& part : samples) matches.insert(matches.end(), part.begin(), part.end());
+  if (matches.size() <= kMostSamples) return matches;
+  std::vector<LightSheets::Match> thinned;
+  for (std::size_t k = 0; k < kMostSamples; ++k) thinned.push_back(matches[k * matches.size() / kMostSamples]);
+  return thinned;
+}
+
 }  // namespace
 
-RangeImage match_codes(CodeImage const& left, CodeRows const& left_rows, CodeRows const& right_rows,
-                       Rectification const& rectification, Camera const& camera, MatchFigures& figures,
-                       Context& context) {
-  Matcher matcher(left, left_rows, right_rows, rectification, camera);
+RangeImage match_codes(CodeImage const& left, std::function<CodeRows(int step)> const& left_rows,
+                       CodeRows const& right_rows, Rectification const& rectification, Camera const& camera,
+                       MatchFigures& figures, Context& context) {
+  Matcher matcher(left, right_rows, rectification, camera);
   auto const bands = static_cast<std::size_t>((camera.height() + kBandRows - 1) / kBandRows);
   auto const for_each_row = [&](auto const& work) {
     for_each_index(context, bands, [&](std::size_t band) {
@@ -386,16 +416,11 @@ RangeImage match_codes(CodeImage const& left, CodeRows const& left_rows, CodeRow
       for (int y = first; y < std::min(first + kBandRows, camera.height()); ++y) work(band, y);
     });
   };
-  std::vector<std::vector<LightSheets::Match>> samples(bands);
-  for_each_row([&](std::size_t band, int y) {
-    if (y % kSampleStep == 0) matcher.sample_row(y, samples[band]);
-  });
-  std::vector<LightSheets::Match> matches;
-  for (auto const& part : samples) matches.insert(matches.end(), part.begin(), part.end());
-  LightSheets const sheets(matches);
+  LightSheets const sheets(sample_matches(matcher, left_rows(kSampleStep), context));
+  CodeRows const all_left = sheets.usable() ? CodeRows() : left_rows(1);
   figures.sheet_scatter = sheets.usable() ? sheets.scatter() : 0;
   std::vector<std::vector<Matcher::Doubt>> doubts(bands);
-  for_each_row([&](std::size_t band, int y) { matcher.match_row(y, sheets, doubts[band]); });
+  for_each_row([&](std::size_t band, int y) { matcher.match_row(y, sheets, all_left, doubts[band]); });
   std::vector<std::vector<std::optional<Partner>>> settled(bands);
   for_each_index(context, bands, [&](std::size_t band) {
     for (auto const& doubt : doubts[band]) settled[band].push_back(matcher.settle(doubt));

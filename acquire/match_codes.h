@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "acquire/code_image.h"
@@ -31,6 +32,7 @@ class CodeRows {
   CodeRows() = default;
   CodeRows(CodeImage rectified, Context& context);
   int rows() const { return image_.code.rows; }
+  CodeImage const& image() const { return image_; }
   /// Change of the code along a row over that from row to row; infinite where it does not change from row to row.
   /// Near 0 the light runs along the rows, and a place on a row says nothing.
   double change_along_rows() const { return change_along_rows_; }
@@ -75,11 +77,12 @@ struct MatchFigures {
 /// `kNear` pixels of what the surroundings agree on; else the pixel is inconsistent. Depths that fewer than two of the
 /// eight neighbours support go, too.
 ///
-/// `left` are the codes on the grid of the ideal left camera (see resample), `left_rows` and `right_rows` on the
-/// rectified ones. sigma = depth · Z / (f · baseline) · sqrt(sigma_left² + sigma_right²) / |d code / dx|, Z the depth
-/// in the rectified frame.
-RangeImage match_codes(CodeImage const& left, CodeRows const& left_rows, CodeRows const& right_rows,
-                       Rectification const& rectification, Camera const& camera, MatchFigures& figures,
-                       Context& context);
+/// `left` are the codes on the grid of the ideal left camera (see resample), `right_rows` on the right rectified one;
+/// `left_rows(step)` makes every so many rows of the left rectified one: every third tells where the light was, and all
+/// are asked for only where that cannot be told. sigma = depth · Z / (f · baseline) · sqrt(sigma_left² + sigma_right²)
+/// / |d code / dx|, Z the depth in the rectified frame.
+RangeImage match_codes(CodeImage const& left, std::function<CodeRows(int step)> const& left_rows,
+                       CodeRows const& right_rows, Rectification const& rectification, Camera const& camera,
+                       MatchFigures& figures, Context& context);
 
 }  // namespace scanview

@@ -73,28 +73,41 @@ Rectification rectify(StereoRig const& rig) {
   return result;
 }
 
-cv::Mat2f picture_map(Camera const& target, Matrix3d const& target_from_camera, LensCamera const& camera) {
-  int const rows = (target.height() + kGrid - 2) / kGrid + 1, cols = (target.width() + kGrid - 2) / kGrid + 1;
+PictureMap::PictureMap(Camera const& target, Matrix3d const& target_from_camera, LensCamera const& camera)
+    : size_(target.width(), target.height()),
+      // One place beyond the last pixel, so that every pixel has a whole cell.
+      exact_((target.height() - 1) / kGrid + 2, (target.width() - 1) / kGrid + 2) {
   Matrix3d const camera_from_target = target_from_camera.transpose();
-  cv::Mat2f exact(rows, cols);
-  for (int j = 0; j < rows; ++j)
-    for (int i = 0; i < cols; ++i) {
+  for (int j = 0; j < exact_.rows; ++j)
+    for (int i = 0; i < exact_.cols; ++i) {
       Eigen::Vector2d const pixel = camera.project(camera_from_target * target.ray_direction(i * kGrid, j * kGrid));
-      exact(j, i) = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
+      exact_(j, i) = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
     }
-  cv::Mat2f map(target.height(), target.width());
-  std::vector<cv::Vec2f> line(static_cast<std::size_t>(cols));
-  for (int y = 0; y < map.rows; ++y) {
-    int const j = std::min(y / kGrid, std::max(rows - 2, 0)), below = std::min(j + 1, rows - 1);
-    float const v = static_cast<float>(y - j * kGrid) / kGrid;
-    for (int i = 0; i < cols; ++i) line[static_cast<std::size_t>(i)] = exact(j, i) * (1 - v) + exact(below, i) * v;
-    for (int x = 0; x < map.cols; ++x) {
-      auto const i = static_cast<std::size_t>(std::min(x / kGrid, std::max(cols - 2, 0)));
-      float const u = static_cast<float>(x - static_cast<int>(i) * kGrid) / kGrid;
-      map(y, x) = line[i] * (1 - u) + line[std::min(i + 1, line.size() - 1)] * u;
+}
+
+cv::Vec2f PictureMap::at(int x, int y) const {
+  int const i = x / kGrid, j = y / kGrid;
+  float const u = static_cast<float>(x - i * kGrid) / kGrid, v = static_cast<float>(y - j * kGrid) / kGrid;
+  cv::Vec2f const before = exact_(j, i) * (1 - v) + exact_(j + 1, i) * v;
+  cv::Vec2f const after = exact_(j, i + 1) * (1 - v) + exact_(j + 1, i + 1) * v;
+  return before * (1 - u) + after * u;
+}
+
+void PictureMap::row(int y, std::vector<cv::Vec2f>& places) const {
+  places.resize(static_cast<std::size_t>(size_.width));
+  int const j = y / kGrid;
+  float const v = static_cast<float>(y - j * kGrid) / kGrid;
+  cv::Vec2f const *const above = exact_[j], *const below = exact_[j + 1];
+  cv::Vec2f before = above[0] * (1 - v) + below[0] * v;
+  std::size_t x = 0;
+  for (int i = 1; i < exact_.cols; ++i) {
+    cv::Vec2f const after = above[i] * (1 - v) + below[i] * v;
+    for (int k = 0; k < kGrid && x < places.size(); ++k, ++x) {
+      float const u = static_cast<float>(k) / kGrid;
+      places[x] = before * (1 - u) + after * u;
     }
+    before = after;
   }
-  return map;
 }
 
 }  // namespace scanview

@@ -1,4 +1,7 @@
 #pragma once
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
 #include "calib/stereo_rig.h"
 
 namespace scanview {
@@ -17,7 +20,20 @@ struct Rectification {
 Rectification rectify(StereoRig const& rig);
 
 /// For every pixel of an ideal camera that is turned against a real one, where that direction is in the real one's
-/// picture; NaN where it is behind it. Exact at every fourth pixel, bilinear between: off by less than 0.001 px.
-cv::Mat2f picture_map(Camera const& target, Eigen::Matrix3d const& target_from_camera, LensCamera const& camera);
+/// picture; NaN where it is behind it. Exact at every fourth pixel, bilinear between: off by less than 0.001 px. Places
+/// are made when they are asked for: kept for all pixels they would be the largest thing in memory.
+class PictureMap {
+ public:
+  PictureMap() = default;
+  PictureMap(Camera const& target, Eigen::Matrix3d const& target_from_camera, LensCamera const& camera);
+  cv::Size size() const { return size_; }
+  cv::Vec2f at(int x, int y) const;
+  /// The places of a whole row, `size().width` of them.
+  void row(int y, std::vector<cv::Vec2f>& places) const;
+
+ private:
+  cv::Size size_;
+  cv::Mat2f exact_;
+};
 
 }  // namespace scanview
