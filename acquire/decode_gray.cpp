@@ -10,19 +10,15 @@ namespace {
 
 constexpr int kNoiseRows = 8;  // every so many rows are sampled
 
-cv::Mat1s difference(cv::Mat const& pattern, cv::Mat const& inverse) {
-  cv::Mat1s d(pattern.size());
-  for (int y = 0; y < d.rows; ++y) {
-    std::int16_t* const out = d[y];
-    if (pattern.depth() == CV_8U) {
-      auto const *const a = pattern.ptr<std::uint8_t>(y), *const b = inverse.ptr<std::uint8_t>(y);
-      for (int x = 0; x < d.cols; ++x) out[x] = static_cast<std::int16_t>(a[x] - b[x]);
-    } else {
-      auto const *const a = pattern.ptr<std::uint16_t>(y), *const b = inverse.ptr<std::uint16_t>(y);
-      for (int x = 0; x < d.cols; ++x) out[x] = static_cast<std::int16_t>((a[x] >> 1) - (b[x] >> 1));
-    }
+/// pattern - inverse of a row, halved where pictures have 16 bits.
+void difference(cv::Mat const& pattern, cv::Mat const& inverse, int y, std::int16_t* d) {
+  if (pattern.depth() == CV_8U) {
+    auto const *const a = pattern.ptr<std::uint8_t>(y), *const b = inverse.ptr<std::uint8_t>(y);
+    for (int x = 0; x < pattern.cols; ++x) d[x] = static_cast<std::int16_t>(a[x] - b[x]);
+  } else {
+    auto const *const a = pattern.ptr<std::uint16_t>(y), *const b = inverse.ptr<std::uint16_t>(y);
+    for (int x = 0; x < pattern.cols; ++x) d[x] = static_cast<std::int16_t>((a[x] >> 1) - (b[x] >> 1));
   }
-  return d;
 }
 
 }  // namespace
@@ -48,7 +44,13 @@ void GrayDecoder::add(GrayFrame const& what, cv::Mat const& picture) {
 
 void GrayDecoder::add_pair(GrayFrame const& what, cv::Mat const& pattern, cv::Mat const& inverse) {
   is_16_bit_ = pattern.depth() == CV_16U;
-  (what.is_row ? rows_ : columns_).add(what.bit, difference(pattern, inverse));
+  GrayBits& bits = what.is_row ? rows_ : columns_;
+  if (bits.word.empty()) bits.create(pattern.size());
+  std::vector<std::int16_t> d(static_cast<std::size_t>(pattern.cols));
+  for (int y = 0; y < pattern.rows; ++y) {
+    difference(pattern, inverse, y, d.data());
+    bits.add_row(what.bit, y, d.data());
+  }
   if (level_.empty()) {
     cv::addWeighted(pattern, 0.5, inverse, 0.5, 0, level_);
     cv::max(pattern, inverse, brightest_);

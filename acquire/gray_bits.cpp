@@ -191,33 +191,35 @@ void GrayBits::create(cv::Size size) {
 
 void GrayBits::add(int bit, cv::Mat1s const& d) {
   if (word.empty()) create(d.size());
+  for (int y = 0; y < d.rows; ++y) add_row(bit, y, d[y]);
+}
+
+void GrayBits::add_row(int bit, int y, std::int16_t const* d) {
   auto const mask = static_cast<std::uint16_t>(1U << bit);
   auto const this_bit = static_cast<std::int16_t>(bit);
-  if (bit == 0) d.copyTo(finest);
-  for (int y = 0; y < d.rows; ++y) {
-    std::int16_t const* const values = d[y];
-    std::uint16_t* const words = word[y];
-    std::int16_t *const weak = weakest[y], *const weak_bit = weakest_bit[y], *const next = second[y],
-                        *const most = largest[y];
-    // All 16 bits wide and without branches: the compiler makes vectors of it.
-    if (bit == 0) {
-      for (int x = 0; x < d.cols; ++x) {
-        std::int16_t const size = size_of(values[x]);
-        words[x] = static_cast<std::uint16_t>(words[x] | (values[x] > 0 ? mask : 0));
-        most[x] = size > most[x] ? size : most[x];
-      }
-      continue;
-    }
-    for (int x = 0; x < d.cols; ++x) {
-      std::int16_t const value = values[x], size = size_of(value), least = size_of(weak[x]);
-      bool const weaker = size < least;
-      std::int16_t const other = weaker ? least : size;
-      words[x] = static_cast<std::uint16_t>(words[x] | (value > 0 ? mask : 0));
-      next[x] = other < next[x] ? other : next[x];
-      weak[x] = weaker ? value : weak[x];
-      weak_bit[x] = weaker ? this_bit : weak_bit[x];
+  int const cols = word.cols;
+  std::uint16_t* const words = word[y];
+  std::int16_t *const weak = weakest[y], *const weak_bit = weakest_bit[y], *const next = second[y],
+                      *const most = largest[y];
+  // All 16 bits wide and without branches: the compiler makes vectors of it.
+  if (bit == 0) {
+    std::copy(d, d + cols, finest[y]);
+    for (int x = 0; x < cols; ++x) {
+      std::int16_t const size = size_of(d[x]);
+      words[x] = static_cast<std::uint16_t>(words[x] | (d[x] > 0 ? mask : 0));
       most[x] = size > most[x] ? size : most[x];
     }
+    return;
+  }
+  for (int x = 0; x < cols; ++x) {
+    std::int16_t const value = d[x], size = size_of(value), least = size_of(weak[x]);
+    bool const weaker = size < least;
+    std::int16_t const other = weaker ? least : size;
+    words[x] = static_cast<std::uint16_t>(words[x] | (value > 0 ? mask : 0));
+    next[x] = other < next[x] ? other : next[x];
+    weak[x] = weaker ? value : weak[x];
+    weak_bit[x] = weaker ? this_bit : weak_bit[x];
+    most[x] = size > most[x] ? size : most[x];
   }
 }
 

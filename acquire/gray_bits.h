@@ -16,6 +16,8 @@ struct GrayBits {
 
   void create(cv::Size size);
   void add(int bit, cv::Mat1s const& d);
+  /// One row of it, `d` as long as the row; after create().
+  void add_row(int bit, int y, std::int16_t const* d);
 };
 
 /// Column of every pixel, whole, as the bits say; -1 where light or contrast are too little, -2 where bits contradict:
