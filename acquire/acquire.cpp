@@ -159,7 +159,10 @@ class Acquisition {
         right_rows = CodeRows(resample(right.image, links[s], geometry.right_row_map, context_), context_);
     });
     auto const left_rows = [&](int step) {
-      return CodeRows(resample(left.image, links[0], geometry.left_row_map, context_, step), context_);
+      CodeImage codes = resample(left.image, links[0], geometry.left_row_map, context_, step);
+      // Samples are of pixels that count; rivals may be any.
+      if (step > 1 && !left.centres.empty()) keep_centres(codes, left.centres, geometry.left_row_map, step);
+      return CodeRows(std::move(codes), context_);
     };
     if (right_rows.change_along_rows() < kLeastAlongRows)
       throw Error(
@@ -180,11 +183,11 @@ class Acquisition {
   }
 
   /// The stripe decoder's own pixels: those that the middle of a stripe is in.
-  static void keep_centres(CodeImage& ideal, cv::Mat1b const& centres, PictureMap const& map) {
+  static void keep_centres(CodeImage& ideal, cv::Mat1b const& centres, PictureMap const& map, int step = 1) {
     for (int y = 0; y < ideal.code.rows; ++y)
       for (int x = 0; x < ideal.code.cols; ++x) {
         if (!ideal.has_code(x, y)) continue;
-        cv::Vec2f const at = map.at(x, y);
+        cv::Vec2f const at = map.at(x, y * step);
         if (centres(static_cast<int>(at[1] + 0.5F), static_cast<int>(at[0] + 0.5F)) != 0) continue;
         ideal.code(y, x) = kMissing;
         ideal.classes(y, x) = static_cast<std::uint8_t>(PixelClass::no_light);

@@ -11,6 +11,7 @@ namespace scanview {
 namespace {
 
 constexpr int kBandRows = 16;
+constexpr int kRowStride = 4;
 constexpr double kMostChanges = 1e5;  // pixels whose changes tell the usual one
 constexpr float kGentle = 3;
 constexpr float kSteep = 12;
@@ -24,9 +25,10 @@ constexpr float kLeastFall = 0.3F;  // of the light, from one pixel to the next 
 /// Changes code(p + step) - code(p) at evenly spread pixels: their medians are known to a thousandth of a spread.
 std::vector<double> changes(CodeImage const& image, int dx, int dy) {
   std::vector<double> result;
-  int const stride = std::max(2, static_cast<int>(std::sqrt(static_cast<double>(image.code.total()) / kMostChanges)));
-  for (int y = 0; y + dy < image.code.rows; y += stride)
-    for (int x = 0; x + dx < image.code.cols; x += stride) {
+  int const stride =
+      std::max(1, static_cast<int>(static_cast<double>(image.code.total()) / (kRowStride * kMostChanges)));
+  for (int y = 0; y + dy < image.code.rows; y += kRowStride)
+    for (int x = y / kRowStride % stride; x + dx < image.code.cols; x += stride) {
       double const change = image.code(y + dy, x + dx) - image.code(y, x);
       if (std::isfinite(change)) result.push_back(change);
     }

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "acquire/decode_sweep.h"
 #include "acquire/peak_fit.h"
@@ -26,6 +28,36 @@ constexpr double kWidthShare = 0.5;   // a peak this much wider or narrower than
 constexpr int kSampleStep = 5;        // rows and columns looked at for noise and width
 constexpr int kBandRows = 16;
 constexpr int kLeastUsable = 5;  // of kSpan values; four parameters
+
+/// Collects peaks and fits them some at once. `use(x, samples, peak)` gets each, in order.
+class PeakQueue {
+ public:
+  PeakQueue(PixelNoise const& noise, WidthPrior const& prior, PeakDetail detail)
+      : noise_(noise), prior_(prior), detail_(detail) {}
+
+  template <class Use>
+  void add(int x, PeakSamples const& samples, Use const& use) {
+    x_[count_] = x;
+    samples_[count_++] = samples;
+    if (count_ == kPeaksAtOnce) flush(use);
+  }
+  template <class Use>
+  void flush(Use const& use) {
+    if (count_ == 0) return;
+    std::array<Peak, kPeaksAtOnce> peaks;
+    fit_peaks(samples_.data(), static_cast<int>(count_), kReach, noise_, prior_, peaks.data(), detail_);
+    for (std::size_t i = 0; i < count_; ++i) use(x_[i], samples_[i], peaks[i]);
+    count_ = 0;
+  }
+
+ private:
+  PixelNoise noise_;
+  WidthPrior prior_;
+  PeakDetail detail_;
+  std::array<PeakSamples, kPeaksAtOnce> samples_;
+  std::array<int, kPeaksAtOnce> x_ = {};
+  std::size_t count_ = 0;
+};
 
 }  // namespace
 
@@ -89,8 +121,11 @@ struct SpaceTimeDecoder::TypedState final : State {
       rows[static_cast<std::size_t>(k)] =
           frame >= oldest && frame < frames ? recent[static_cast<std::size_t>(frame - oldest)][y] : nullptr;
     }
-    for (int x = 0; x < age.cols; ++x) {
-      if (ages[x] != ago) continue;
+    std::uint8_t const* const end = ages + age.cols;
+    for (std::uint8_t const* at = ages;
+         (at = static_cast<std::uint8_t const*>(std::memchr(at, ago, static_cast<std::size_t>(end - at)))) != nullptr;
+         ++at) {
+      auto const x = static_cast<int>(at - ages);
       best_frame(y, x) = static_cast<std::uint16_t>(best_at);
       T* const kept = around[y] + static_cast<std::ptrdiff_t>(x) * kSpan;
       for (std::size_t k = 0; k < kSpan; ++k) kept[k] = rows[k] ? rows[k][x] : T{0};
@@ -132,10 +167,7 @@ struct SpaceTimeDecoder::TypedState final : State {
     auto const bands = static_cast<std::size_t>((best.rows + kBandRows - 1) / kBandRows);
     for_each_index(context, bands, [&](std::size_t band) {
       int const first = static_cast<int>(band) * kBandRows;
-      for (int y = first; y < std::min(first + kBandRows, best.rows); ++y)
-        for (int x = 0; x < best.cols; ++x)
-          image.classes(y, x) = static_cast<std::uint8_t>(
-              decode(x, y, figures.noise, prior, image.code(y, x), image.sigma(y, x), image.bias(y, x)));
+      for (int y = first; y < std::min(first + kBandRows, best.rows); ++y) decode_row(y, figures.noise, prior, image);
     });
     return image;
   }
@@ -147,21 +179,22 @@ struct SpaceTimeDecoder::TypedState final : State {
     for (int round = 0; round < 2; ++round) {
       NoiseFit fit(kFull);
       std::vector<double> widths;
-      for (int y = kSampleStep / 2; y < best.rows; y += kSampleStep)
-        for (int x = kSampleStep / 2; x < best.cols; x += kSampleStep) {
-          if (!may_be_lit(x, y, figures.noise)) continue;
-          PeakSamples const s = samples(x, y);
-          Peak const peak = fit_peak(s, kReach, figures.noise, prior, PeakDetail::with_leverage);
-          if (!peak.converged || peak.degrees_of_freedom < 1) continue;
-          for (int k = 0; k < kSpan; ++k) {
-            double const u = (k - peak.time) / peak.width, share = 1 - peak.leverage[k];
-            if (!s.usable[k] || share < 0.2) continue;
-            double const model = peak.ambient + peak.height * std::exp(-0.5 * u * u);
-            fit.add(model, (s.value[k] - model) / std::sqrt(share));
-          }
-          if (peak.height < 20 * std::sqrt(figures.noise.variance(peak.ambient))) continue;
-          widths.push_back(peak.width);
+      auto const note = [&](int, PeakSamples const& s, Peak const& peak) {
+        if (!peak.converged || peak.degrees_of_freedom < 1) return;
+        for (int k = 0; k < kSpan; ++k) {
+          double const u = (k - peak.time) / peak.width, share = 1 - peak.leverage[k];
+          if (!s.usable[k] || share < 0.2) continue;
+          double const model = peak.ambient + peak.height * std::exp(-0.5 * u * u);
+          fit.add(model, (s.value[k] - model) / std::sqrt(share));
         }
+        if (peak.height < 20 * std::sqrt(figures.noise.variance(peak.ambient))) return;
+        widths.push_back(peak.width);
+      };
+      PeakQueue queue(figures.noise, prior, PeakDetail::with_leverage);
+      for (int y = kSampleStep / 2; y < best.rows; y += kSampleStep)
+        for (int x = kSampleStep / 2; x < best.cols; x += kSampleStep)
+          if (may_be_lit(x, y, figures.noise)) queue.add(x, samples(x, y), note);
+      queue.flush(note);
       figures.noise = fit.solve(figures.noise);  // with next to no light, the guess
       if (widths.empty()) return;
       auto const middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
@@ -172,19 +205,41 @@ struct SpaceTimeDecoder::TypedState final : State {
     }
   }
 
-  PixelClass decode(int x, int y, PixelNoise const& noise, WidthPrior const& prior, float& code, float& sigma,
-                    float& bias) const {
+  void decode_row(int y, PixelNoise const& noise, WidthPrior const& prior, CodeImage& image) const {
+    auto const finish_pixel = [&](int x, PeakSamples const&, Peak const& peak) {
+      image.classes(y, x) = static_cast<std::uint8_t>(
+          judge(x, y, peak, noise, prior, image.code(y, x), image.sigma(y, x), image.bias(y, x)));
+    };
+    PeakQueue queue(noise, prior, PeakDetail::without_leverage);
+    for (int x = 0; x < best.cols; ++x) {
+      if (auto const why = why_none(x, y, noise)) {
+        image.classes(y, x) = static_cast<std::uint8_t>(*why);
+        continue;
+      }
+      PeakSamples const s = samples(x, y);
+      if (std::count(s.usable, s.usable + kSpan, true) >= kLeastUsable)
+        queue.add(x, s, finish_pixel);
+      else
+        image.classes(y, x) =
+            static_cast<std::uint8_t>(is_saturated(x, y) ? PixelClass::saturated : PixelClass::no_light);
+    }
+    queue.flush(finish_pixel);
+  }
+
+  bool is_saturated(int x, int y) const { return best(y, x) == std::numeric_limits<T>::max(); }
+
+  /// Of a pixel that has no single peak to fit.
+  std::optional<PixelClass> why_none(int x, int y, PixelNoise const& noise) const {
     if (!may_be_lit(x, y, noise)) return PixelClass::no_light;
     double const height = best(y, x) - least(y, x);
-    bool const is_saturated = best(y, x) == std::numeric_limits<T>::max();
     if (second(y, x) - least(y, x) > kSecondPeak * height)  // full scale for long is one peak, cut off
       return second(y, x) == std::numeric_limits<T>::max() ? PixelClass::saturated : PixelClass::several_peaks;
-    PeakSamples const s = samples(x, y);
-    int usable = 0;
-    for (int k = 0; k < kSpan; ++k) usable += s.usable[k];
-    PixelClass const failed = is_saturated ? PixelClass::saturated : PixelClass::several_peaks;
-    if (usable < kLeastUsable) return is_saturated ? PixelClass::saturated : PixelClass::no_light;
-    Peak const peak = fit_peak(s, kReach, noise, prior);
+    return {};
+  }
+
+  PixelClass judge(int x, int y, Peak const& peak, PixelNoise const& noise, WidthPrior const& prior, float& code,
+                   float& sigma, float& bias) const {
+    PixelClass const failed = is_saturated(x, y) ? PixelClass::saturated : PixelClass::several_peaks;
     if (!peak.converged || std::abs(peak.time - kReach) > 2) return failed;
     double const time = best_frame(y, x) - kReach + peak.time;
     if (time < 0 || time > frames - 1) return PixelClass::no_light;  // the beam's middle never came
@@ -193,7 +248,7 @@ struct SpaceTimeDecoder::TypedState final : State {
     if (ratio > 1 + kWidthShare || ratio < 1 - kWidthShare) return failed;
     double const fit = peak.chi_square / std::max(peak.degrees_of_freedom, 1);
     if (fit > kWorstFit) return failed;
-    if (!(peak.time_sigma < 0.5)) return is_saturated ? PixelClass::saturated : PixelClass::no_light;
+    if (!(peak.time_sigma < 0.5)) return is_saturated(x, y) ? PixelClass::saturated : PixelClass::no_light;
     code = static_cast<float>(time);
     sigma = static_cast<float>(peak.time_sigma);
     // Of a beam much narrower than the step one frame alone tells, and where between two the peak was is a guess.

@@ -56,6 +56,7 @@ LightSheets::LightSheets(std::vector<Match> const& matches) {
   std::vector<double> expected;
   for (auto const& m : matches) expected.push_back(0.25 * m.sigma * m.sigma);
   scatter_ = std::max(std::sqrt(std::max(scatter * scatter - median(expected), 0.0)), 0.1 * scatter);
+  residual_sigma_ = scatter;
   usable_ = scatter <= kMostScatter * (high_ - low_);
 }
 

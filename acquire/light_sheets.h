@@ -30,6 +30,8 @@ class LightSheets {
   double tolerance(Match const& match) const;
   /// Standard deviation of what the codes' own errors do not explain, in codes.
   double scatter() const { return scatter_; }
+  /// Standard deviation of right matches' residuals, whatever the reason: how well a place on a sheet is known.
+  double residual_sigma() const { return residual_sigma_; }
 
  private:
   Eigen::Vector4d normalised(Match const& match) const;
@@ -42,7 +44,7 @@ class LightSheets {
   Eigen::Vector4d above_ = Eigen::Vector4d::Zero(), below_ = Eigen::Vector4d::Zero();
   double low_ = 0, high_ = 1;   // codes
   std::vector<double> motion_;  // h at evenly spaced codes
-  double scatter_ = 0;
+  double scatter_ = 0, residual_sigma_ = 0;
   bool usable_ = false;
 };
 

@@ -225,13 +225,15 @@ class Matcher {
     Partners partners;
   };
 
-  /// Thinly sampled pixels of row `i` of the left rectified rows (every kSampleStep-th of the picture) that have one
+  /// Sampled pixels of row `i` of the left rectified rows (every kSampleStep-th of the picture) that have one
   /// partner and no rival: what tells of the light.
   void sample_row(CodeRows const& left_rows, int i, std::vector<LightSheets::Match>& matches) const {
     int const y = i * kSampleStep;
     if (y >= right_rows_.rows()) return;
     CodeImage const& codes = left_rows.image();
-    for (int x = 0; x < codes.code.cols; x += kSampleStep) {
+    // A tenth of the pixels looked at suffices where half of them have no partner that is alone.
+    int const step = std::max(kSampleStep, static_cast<int>(codes.code.total() / (10 * kMostSamples)));
+    for (int x = i % step; x < codes.code.cols; x += step) {
       float const code = codes.code(i, x);
       if (std::isnan(code)) continue;
       Eigen::Vector2d const at = rectification_.left.ray_direction(x, y).head<2>();
@@ -367,7 +369,7 @@ class Matcher {
     double const change = (high - low) / (2 * kLeapReach);  // codes a pixel
     partner.x += static_cast<float>(-0.5 * (low + high) / change);
     partner.slope = static_cast<float>(std::abs(change));
-    partner.sigma_x = static_cast<float>(sheets.scatter() / std::abs(change));
+    partner.sigma_x = static_cast<float>(sheets.residual_sigma() / std::abs(change));
     partner.bias = 0;
     return true;
   }

@@ -30,9 +30,18 @@ struct WidthPrior {
 
 enum class PeakDetail { without_leverage, with_leverage };
 
-/// Maximum likelihood of the four parameters under the noise (Levenberg-Marquardt; the variances are those of the
-/// model itself). `start_time` is where the greatest value is.
-Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior,
-              PeakDetail detail = PeakDetail::without_leverage);
+inline constexpr int kPeaksAtOnce = 8;
+
+/// Maximum likelihood of the four parameters of `count` peaks (1 to kPeaksAtOnce) under the noise
+/// (Levenberg-Marquardt; the variances are those of the model itself). All have as many samples. `start_time` is where
+/// the greatest value is. A peak's result does not depend on those beside it, nor on the processor.
+void fit_peaks(PeakSamples const* samples, int count, double start_time, PixelNoise const& noise,
+               WidthPrior const& prior, Peak* peaks, PeakDetail detail = PeakDetail::without_leverage);
+inline Peak fit_peak(PeakSamples const& samples, double start_time, PixelNoise const& noise, WidthPrior const& prior,
+                     PeakDetail detail = PeakDetail::without_leverage) {
+  Peak peak;
+  fit_peaks(&samples, 1, start_time, noise, prior, &peak, detail);
+  return peak;
+}
 
 }  // namespace scanview
