@@ -17,7 +17,8 @@ struct Rectification {
 Rectification rectify(StereoRig const& rig);
 
 /// For every pixel of an ideal camera that is turned against a real one, where that direction is in the real one's
-/// picture; NaN where it is behind it. Exact at every fourth pixel, bilinear between: off by less than 0.001 px.
+/// picture; NaN where it is behind it. Exact at every fourth pixel, bilinear between: off by less than 2 px divided
+/// by the focal length in pixels.
 cv::Mat2f picture_map(Camera const& target, Eigen::Matrix3d const& target_from_camera, LensCamera const& camera);
 
 }  // namespace scanview
