@@ -143,6 +143,23 @@ void read_gray(Capture& capture, Json const& json) {
   capture.projector_rows = optional_integer(json, "projector_rows", 1, 1 << kMostBits, path);
 }
 
+/// Keys that say nothing where they stand, or something else than another one says.
+void refuse_contradictions(Capture const& capture, Json const& json) {
+  fs::path const& path = capture.file;
+  auto const has = [&](char const* key) { return json.contains(key) && !json[key].is_null(); };
+  if (capture.pattern == Capture::Pattern::sweep) {
+    for (char const* key :
+         {"bits", "row_bits", "rows_first", "inverse", "order", "projector_columns", "projector_rows"})
+      if (has(key)) fail(path, fmt::format("'{}' belongs to pattern \"gray\"", key));
+    return;
+  }
+  if (has("row_bits") && capture.in_opencv_order && !has("rows_first"))
+    fail(path, "'row_bits' without 'rows_first': which picture is the first of rows?");
+  for (auto const& [key, bits] : {std::pair{"bits", capture.bits}, {"row_bits", capture.row_bits}})
+    if (auto const stated = optional_integer(json, key, 1, kMostBits, path); stated && *stated != bits)
+      fail(path, fmt::format("'{}' is {}, but 'order' has {}", key, *stated, bits));
+}
+
 Eigen::Vector3d read_backdrop(Json const& json, fs::path const& path) {
   std::string const text = json_text(json, "backdrop", path);
   unsigned value = 0;
@@ -239,6 +256,7 @@ Capture read_capture(fs::path const& file, fs::path const& folder) {
     }
   }
   if (capture.pattern == Capture::Pattern::gray) read_gray(capture, json);
+  refuse_contradictions(capture, json);
   if (capture.pattern == Capture::Pattern::sweep && capture.frame_count() < 4)
     fail(file, fmt::format("a sweep of {} light positions has no peaks to find: at least 4", capture.frame_count()));
   return capture;

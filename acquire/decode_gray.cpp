@@ -51,9 +51,12 @@ void GrayDecoder::add_pair(GrayFrame const& what, cv::Mat const& pattern, cv::Ma
     difference(pattern, inverse, y, d.data());
     bits.add_row(what.bit, y, d.data());
   }
-  if (level_.empty()) {
+  // The coarsest bit's, whatever the order: where d passes zero the greater is half as bright, and fine stripes have
+  // many such places.
+  if (level_.empty() || (!what.is_row && what.bit > level_bit_)) {
     cv::addWeighted(pattern, 0.5, inverse, 0.5, 0, level_);
     cv::max(pattern, inverse, brightest_);
+    level_bit_ = what.is_row ? -1 : what.bit;
   }
   sample_noise(pattern, inverse);
 }

@@ -37,7 +37,8 @@ class GrayDecoder {
   std::vector<Pending> pending_;
   cv::Mat1f last_sum_;           // of a pair, on every eighth row
   std::optional<NoiseFit> fit_;  // from what pairs' sums differ by
-  cv::Mat level_, brightest_;    // mean and greater of the first pair
+  cv::Mat level_, brightest_;    // mean and greater of the pair of the coarsest bit
+  int level_bit_ = -1;           // which; -1: a row's
   PixelNoise noise_;
   cv::Mat1i row_codes_;
   bool is_16_bit_ = false;

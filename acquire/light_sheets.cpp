@@ -46,8 +46,9 @@ LightSheets::LightSheets(std::vector<Match> const& matches) {
     for (auto const& m : matches) sizes.push_back(std::abs(residual(m)));
     scatter = median(sizes) / 0.6745;
     if (!std::isfinite(scatter)) return;
-    // Tukey's weights, from wide to narrow: at first most residuals are the model's own.
-    double const cut = std::max(scatter, 1e-6 * (high_ - low_)) * (round < 6 ? 8 : 5);
+    // Tukey's weights: narrow while wrong matches bend the source and widen the scatter themselves, then wide while the
+    // light's motion is not fitted yet, then as is usual.
+    double const cut = std::max(scatter, 1e-6 * (high_ - low_)) * (round < 2 ? 3 : round < 6 ? 8 : 5);
     for (std::size_t i = 0; i < sizes.size(); ++i) {
       double const u = sizes[i] / cut;
       weights[i] = u < 1 ? (1 - u * u) * (1 - u * u) : 0;

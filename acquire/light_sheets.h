@@ -19,7 +19,8 @@ class LightSheets {
     double sigma;  ///< of the difference of both cameras' codes
   };
   /// Robust: up to a third of the matches may be wrong. Not usable where there are fewer than 300, or where they do not
-  /// agree on any such source to within `kMostScatter` of the range of codes.
+  /// agree on any such source to within `kMostScatter` of the range of codes, nor where all lie on one plane: there
+  /// p1 and p2 may both be the plane itself.
   explicit LightSheets(std::vector<Match> const& matches);
 
   bool usable() const { return usable_; }

@@ -20,8 +20,9 @@ struct Rectification {
 Rectification rectify(StereoRig const& rig);
 
 /// For every pixel of an ideal camera that is turned against a real one, where that direction is in the real one's
-/// picture; NaN where it is behind it. Exact at every fourth pixel, bilinear between: off by less than 0.001 px. Places
-/// are made when they are asked for: kept for all pixels they would be the largest thing in memory.
+/// picture; NaN where it is behind it. Exact at every fourth pixel, bilinear between: off by less than 2 px divided
+/// by the focal length in pixels. Places are made when they are asked for: kept for all pixels they would be the
+/// largest thing in memory.
 class PictureMap {
  public:
   PictureMap() = default;

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <thread>
 
 #include "acquire/frame_stream.h"
+#include "base/image_file.h"
 #include "tests/acquire/light_scene.h"
 #include "tests/expect_error.h"
 #include "tests/temporary_folder.h"
@@ -15,6 +17,7 @@
 namespace scanview {
 namespace {
 
+namespace fs = std::filesystem;
 using Decoder = AcquireOptions::Decoder;
 
 /// A Gray capture's share is a column counted from 0 to 2^bits, a sweep's a step from 0 to steps - 1: depth does not
@@ -28,6 +31,22 @@ RangeImage acquired(LightScene const& scene, LightOptions const& light, GrayKind
   Context context;
   context.threads = threads;
   return acquire(capture, options, context).set.views.front().image;
+}
+
+/// The same with what else was said, after a change of the folder's pictures.
+AcquireResult result_of(LightScene const& scene, LightOptions const& light, GrayKind gray,
+                        std::function<void(Capture const&)> const& change = {}) {
+  TemporaryFolder const folder;
+  Capture const capture = write_capture(folder.path(), scene, light, gray);
+  if (change) change(capture);
+  Context context;
+  return acquire(capture, {}, context);
+}
+fs::path frame(Capture const& capture, Side side, int k) { return capture.frame_path("view_000", side, k); }
+bool is_warned(AcquireResult const& result, std::string const& text) {
+  auto const& warnings = result.views.front().warnings;
+  return std::any_of(warnings.begin(), warnings.end(),
+                     [&](std::string const& warning) { return warning.find(text) != std::string::npos; });
 }
 
 /// The stated deviation must hold to a fifth either way. Of the depths `most_wrong` may be off by more than five of
@@ -99,6 +118,110 @@ TEST(Acquire, ThreadsDoNotChangeAByte) {
       EXPECT_TRUE(same_bytes(one.sigma, two.sigma));
       EXPECT_TRUE(same_bytes(one.classes, two.classes));
       EXPECT_TRUE(same_bytes(one.color, two.color));
+    }
+}
+
+/// No depth may be further off than its sigma lets expect, even where sigma may say more than that.
+void expect_nothing_wrong(AcquireResult const& result, LightScene const& scene, double least) {
+  DepthErrors const errors = depth_errors(result.set.views.front().image, scene, scene.smooth_part(2));
+  EXPECT_GE(static_cast<double>(errors.depths), least * static_cast<double>(errors.pixels));
+  EXPECT_LT(errors.ratio, 1.25);
+  EXPECT_LE(errors.wrong, 0.002);
+}
+
+TEST(Acquire, ABeamNarrowerThanAPixelClaimsNoMoreThanItKnows) {
+  // 1.7 light steps a pixel: a standard deviation of half a pixel.
+  LightScene const scene;
+  LightOptions light;
+  light.steps = 192;
+  light.beam = 0.8;
+  expect_nothing_wrong(result_of(scene, light, GrayKind::none), scene, 0.97);
+}
+
+TEST(Acquire, ABeamNarrowerThanTheStepIsWarnedOf) {
+  LightScene const scene;
+  LightOptions light;
+  light.beam = 0.3;
+  AcquireResult const result = result_of(scene, light, GrayKind::none);
+  EXPECT_TRUE(is_warned(result, "too narrow to tell where it was between two frames"));
+  expect_nothing_wrong(result, scene, 0.5);
+  EXPECT_FALSE(is_warned(result_of(scene, {}, GrayKind::none), "too narrow"));
+}
+
+TEST(Acquire, CamerasUnderLessThanADegreeAreWarnedOfAndSigmaSaysSo) {
+  LightScene scene;
+  scene.shape = LightScene::Shape::plane;
+  scene.rig.right_from_left = Eigen::Isometry3d::Identity();
+  scene.rig.right_from_left.translation().x() = -8;  // at 580 mm: 0.8°
+  AcquireResult const result = result_of(scene, {}, GrayKind::none);
+  EXPECT_LT(result.views.front().angle_deg, 1);
+  EXPECT_TRUE(is_warned(result, "depths are uncertain, as sigma says"));
+  EXPECT_GT(result.views.front().sigma_median, 5);  // under 15° it is 0.7
+  expect_honest(result.set.views.front().image, scene, 2);
+}
+
+/// One camera's picture stored over another one's place, or both exchanged.
+struct FrameFault {
+  int from, to;
+  bool exchanged;
+  std::vector<Side> sides;
+
+  void operator()(Capture const& capture) const {
+    for (Side const side : sides) {
+      std::string const first = read_file(frame(capture, side, from)), second = read_file(frame(capture, side, to));
+      write_file(frame(capture, side, to), first);
+      if (exchanged) write_file(frame(capture, side, from), second);
+    }
+  }
+};
+std::vector<std::vector<Side>> const kOneSideOrBoth = {{Side::left}, {Side::left, Side::right}};
+
+// A peak with a frame out of place is none that light makes: the pixels lit then are refused, or their sigma holds.
+TEST(Acquire, ADoubledOrSwappedFrameOfASweepIsNamedAndItsPixelsGo) {
+  LightScene const scene;
+  for (auto const& sides : kOneSideOrBoth) {
+    AcquireResult const doubled = result_of(scene, {}, GrayKind::none, FrameFault{15, 16, false, sides});
+    EXPECT_TRUE(is_warned(doubled, "left: frame 16 shows the same light as the one before"));
+    expect_nothing_wrong(doubled, scene, 0.6);
+    AcquireResult const swapped = result_of(scene, {}, GrayKind::none, FrameFault{15, 16, true, sides});
+    EXPECT_TRUE(is_warned(swapped, "left: frame 15 is out of order"));
+    expect_nothing_wrong(swapped, scene, 0.6);
+    EXPECT_EQ(is_warned(doubled, "right: frame 16"), sides.size() == 2);
+    EXPECT_EQ(is_warned(swapped, "right: frame 15"), sides.size() == 2);
+  }
+}
+
+// Bits that a fault flips make other words, which a decoder cannot know: the capture is named unsound. Most pixels go.
+TEST(Acquire, ADoubledOrSwappedPictureOfAGrayCodeIsNamed) {
+  LightScene const scene;
+  for (auto const& sides : kOneSideOrBoth) {
+    AcquireResult const doubled = result_of(scene, {}, GrayKind::inverses, FrameFault{4, 5, false, sides});
+    EXPECT_TRUE(is_warned(doubled, "left: pictures 4 and 5 (bit 2) are equal instead of a pattern and its inverse"));
+    AcquireResult const swapped = result_of(scene, {}, GrayKind::inverses, FrameFault{4, 6, true, sides});
+    EXPECT_TRUE(is_warned(swapped, "left: pictures 4 and 5 (bit 2) are no pattern and its inverse"));
+    EXPECT_TRUE(is_warned(swapped, "left: pictures 6 and 7 (bit 3) are no pattern and its inverse"));
+    std::size_t const sound = result_of(scene, {}, GrayKind::inverses).views.front().depths;
+    EXPECT_LT(doubled.views.front().depths, sound / 2);
+    EXPECT_LT(swapped.views.front().depths, 2 * sound / 3);
+  }
+}
+
+// Exchanged in both cameras alike, a pattern and its inverse give other numbers to the same columns: depth is the same.
+TEST(Acquire, APatternExchangedWithItsInverseInBothCamerasChangesNoDepth) {
+  LightScene const scene;
+  AcquireResult const result =
+      result_of(scene, {}, GrayKind::inverses, FrameFault{4, 5, true, {Side::left, Side::right}});
+  expect_nothing_wrong(result, scene, 0.95);
+}
+
+TEST(Acquire, APictureOfAnotherSizeIsNamed) {
+  for (auto const gray : {GrayKind::none, GrayKind::levels})
+    for (Side const side : kSides) {
+      auto const shrink = [&](Capture const& capture) {
+        write_file(frame(capture, side, 3), encode_png(cv::Mat1b(36, 48, std::uint8_t{9})));
+      };
+      EXPECT_SCANVIEW_ERROR(result_of({}, {}, gray, shrink), ErrorCode::bad_input,
+                            std::string(to_string(side)) + "/03.png: is 48×36, but the camera was calibrated at 96×72");
     }
 }
 

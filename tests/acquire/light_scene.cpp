@@ -17,8 +17,9 @@ using Eigen::Vector3d;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kWidth = 96, kHeight = 72;
 
-/// 0 to 1: how much of a stripe of this bit a column has at a place, its edges blurred over half a column.
-double stripe(double column, int bit) {
+}  // namespace
+
+double gray_stripe(double column, int bit) {
   auto const is_set = [&](double at) {
     auto const k = static_cast<unsigned>(std::max(at, 0.0));
     return static_cast<double>((k ^ (k >> 1)) >> bit & 1U);
@@ -29,8 +30,6 @@ double stripe(double column, int bit) {
   double const share = (after - border) / (2 * kHalf);
   return (1 - share) * is_set(before) + share * is_set(after);
 }
-
-}  // namespace
 
 LightScene::LightScene() {
   auto const camera = [](double cx) {
@@ -160,7 +159,7 @@ cv::Mat LightPictures::gray(GrayFrame const& frame, int number) const {
   return picture(
       [&](double share) -> double {
         if (frame.kind != GrayFrame::Kind::bit) return frame.kind == GrayFrame::Kind::white ? 1 : 0;
-        double const lit = stripe(share * (1 << options_.bits), frame.bit);
+        double const lit = gray_stripe(share * (1 << options_.bits), frame.bit);
         return frame.inverse ? 1 - lit : lit;
       },
       number);

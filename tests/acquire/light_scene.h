@@ -36,6 +36,9 @@ struct LightScene {
   cv::Mat1b smooth_part(int radius) const;
 };
 
+/// 0 to 1: how bright the stripes of a Gray code's bit are at a column, their edges blurred over half a column.
+double gray_stripe(double column, int bit);
+
 /// What is added to a picture, in levels of 8 bits.
 struct CameraNoise {
   double read = 1.0, gain = 0.01;  ///< standard deviation, and variance a level

@@ -17,21 +17,11 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using Layout = BoardDescription::Layout;
 
-/// Whether the whole board, with a white rim, is in the picture: what the detectors ask for.
-bool is_in_picture(BoardDescription const& board, Eigen::Isometry3d const& pose) {
-  for (double const u : {-2.0, board.columns + 1.0})
-    for (double const v : {-2.0, board.rows + 1.0}) {
-      Eigen::Vector3d const corner(u * board.square, v * board.square, 0);
-      if (!true_rig().left.camera.contains(true_rig().left.project(pose * corner))) return false;
-    }
-  return true;
-}
-
 cv::Mat1b chessboard_picture(std::uint64_t seed, PictureNoise const& noise, Eigen::Isometry3d& pose) {
   CounterRandom random(seed, 0);
   BoardDescription const board = chessboard();
   do pose = random_pose(random, 0.5);
-  while (!is_in_picture(board, pose));
+  while (!is_in_picture(true_rig().left, board, pose));
   return render_board(
       true_rig().left, pose, [&](auto const& p) { return chessboard_shade(board, p); }, noise, seed);
 }

@@ -38,6 +38,17 @@ inline Eigen::Isometry3d random_pose(CounterRandom& random, double tilt) {
   return pose;
 }
 
+/// Whether the whole board, with a white rim, is in the picture: what the detectors ask for.
+inline bool is_in_picture(LensCamera const& camera, BoardDescription const& board,
+                          Eigen::Isometry3d const& camera_from_board) {
+  for (double const u : {-2.0, board.columns + 1.0})
+    for (double const v : {-2.0, board.rows + 1.0}) {
+      Eigen::Vector3d const corner(u * board.square, v * board.square, 0);
+      if (!camera.camera.contains(camera.project(camera_from_board * corner))) return false;
+    }
+  return true;
+}
+
 /// Corners of a board as a camera sees them, with normal noise; corners outside of the picture are left out.
 inline std::vector<BoardCorner> see(LensCamera const& camera, Eigen::Isometry3d const& camera_from_board,
                                     BoardDescription const& board, double noise_px, CounterRandom& random) {

@@ -122,13 +122,15 @@ TEST_F(Acquire, ThreadsDoNotChangeAByteAndNothingIsDoneTwice) {
   EXPECT_EQ(read_file(in("1") + "/views/000/range.exr"), read_file(in("2") + "/views/000/range.exr"));
 }
 
-TEST_F(Acquire, ADamagedOrMissingPictureIsNamedAndNothingIsLeft) {
+TEST_F(Acquire, ADamagedMissingOrResizedPictureIsNamedAndNothingIsLeft) {
   fs::path const broken = copy(), frame = broken / "view_001/right/0017.png";
   std::string const bytes = read_file(frame);
   write_file(frame, bytes.substr(0, bytes.size() / 2));
   expect_refused(broken, 3, "view_001/right/0017.png: is truncated");
   write_file(frame, "");
   expect_refused(broken, 3, "view_001/right/0017.png: is empty");
+  write_file(frame, encode_png(cv::Mat1b(60, 80, std::uint8_t{9})));
+  expect_refused(broken, 3, "view_001/right/0017.png: is 80×60, but the camera was calibrated at 160×120");
   fs::remove_all(broken / "view_001/right");
   expect_refused(broken, 3, "view_001/right/00");
   fs::remove(broken / "capture.json");
