@@ -20,6 +20,8 @@ Json SoundnessFigures::to_json() const {
           {"step_scatter", json_number(step_scatter)},
           {"gamma", json_number(gamma)},
           {"gamma_std", json_number(gamma_std)},
+          {"motion_px", json_number(motion_px)},
+          {"motion_std_px", json_number(motion_std_px)},
           {"pair_mismatch", json_number(pair_mismatch)},
           {"doubled", doubled},
           {"missing", missing},

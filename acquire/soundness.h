@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -25,6 +26,8 @@ struct SoundnessFigures {
   double step_scatter = kNone;     ///< standard deviation of the light's step, relative (sweep)
   double gamma = kNone;            ///< value = light^(1 / gamma); 1 is linear (gray)
   double gamma_std = kNone;
+  double motion_px = kNone;  ///< largest shift of a pair's picture against the first picture (gray)
+  double motion_std_px = kNone;
   double pair_mismatch = kNone;           ///< largest share of lit pixels where pattern + inverse is not white + black
   std::vector<std::size_t> doubled;       ///< frames that show the same light as the one before
   std::vector<std::size_t> missing;       ///< a frame is missing before this one
@@ -61,6 +64,19 @@ class LineSamples {
   std::vector<Line> lines_;
 };
 
+/// How much pixels change from frame to frame, over all frames so far: most are not lit in either, so the median is the
+/// camera's noise. A frame costs its samples only, however many came before.
+class ChangeHistogram {
+ public:
+  void add(std::vector<float> const& a, std::vector<float> const& b);
+  double deviation() const;  ///< of a change, share of full scale, to 1 / 4080; 0 before the first
+
+ private:
+  static constexpr std::size_t kBins = 4081;  // sixteen a level of 8 bits
+  std::vector<std::uint32_t> counts_ = std::vector<std::uint32_t>(kBins);
+  std::size_t total_ = 0;
+};
+
 /// A light swept over the scene: feed the frames in order, then ask. How far the light went between two frames is
 /// measured by how much their lit pixels overlap, ∝ exp(−(step / beam)² / 4), which depends neither on the scene's
 /// shape nor on its paint; so one frame too few, too many or in the wrong place shows. The lamp's brightness follows
@@ -90,7 +106,7 @@ class SweepSoundness {
   std::vector<float> excess_, excess_before_, excess_two_before_;  ///< above the ambient light; 0 where not lit
   std::vector<std::size_t> lit_;                                   ///< where excess_ is not 0
   std::vector<std::uint32_t> saturated_;
-  std::vector<double> noises_;
+  ChangeHistogram changes_;
   std::vector<bool> identical_;
   std::vector<Step> steps_;
   double noise_ = 0;
@@ -103,7 +119,8 @@ struct GraySoundnessOptions {
 
 /// Gray code: white and black first where there are any, then the pattern pictures in order. Pattern and inverse must
 /// add up to white and black, the stripes of each bit must be half as wide as those of the bit before, and where
-/// stripes blur into each other the sum tells whether values are proportional to light.
+/// stripes blur into each other the sum tells whether values are proportional to light. The sum of a pair also shows
+/// the scene's own paint: where it is shifted along its own slope, the camera or the scene moved meanwhile.
 class GraySoundness {
  public:
   GraySoundness(std::string camera, GraySoundnessOptions const& options)
@@ -121,11 +138,14 @@ class GraySoundness {
     double equal = 0;        ///< share of lit pixels that are equal in both
     double clear = 0;        ///< share of lit pixels that are wholly bright or dark
     double transitions = 0;  ///< changes a line
+    std::array<double, 2> shift = {SoundnessFigures::kNone, SoundnessFigures::kNone};  ///< along rows, columns: pixels
+    std::array<double, 2> shift_std = {SoundnessFigures::kNone, SoundnessFigures::kNone};
   };
   struct Blurred {
     float pattern, inverse, white, black;
   };
   void add_bit(std::vector<float> const& pattern, std::vector<float> const& inverse);
+  void measure_motion(std::vector<float> const& pattern, std::vector<float> const& inverse, Bit& bit) const;
 
   std::string camera_;
   GraySoundnessOptions options_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "acquire/soundness.h"
 #include "base/median.h"
@@ -13,8 +14,10 @@ constexpr float kFullScale = 0.998F;
 constexpr float kLeastContrast = 0.06F;     // white above black, of full scale
 constexpr std::size_t kMostBlurred = 3000;  // samples a bit for the response
 constexpr std::size_t kFewestSamples = 200;
-constexpr double kWrongPair = 0.33;  // of lit pixels: a pair from two bits disagrees at half of them
-constexpr double kClear = 0.6;       // of lit pixels wholly bright or dark: wide stripes
+constexpr double kWrongPair = 0.33;   // of lit pixels: a pair from two bits disagrees at half of them
+constexpr double kClear = 0.6;        // of lit pixels wholly bright or dark: wide stripes
+constexpr float kLeastSlope = 0.02F;  // of a pair's sum, full scales a pixel: enough to see it move
+constexpr double kMostMotion = 0.3;   // pixels: as much as a rig may be off its rows
 
 }  // namespace
 
@@ -85,6 +88,7 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
       bit.pattern_gain = median(std::move(pattern_gains));
       bit.inverse_gain = median(std::move(inverse_gains));
     }
+    if (bit.mismatch < kWrongPair && bit.clear > kClear && !inverse.empty()) measure_motion(pattern, inverse, bit);
     // Edges between wide stripes only: in fine ones projectors and cameras overshoot. Ties of a wrong pair are no
     // edges.
     if (bit.mismatch < kWrongPair && bit.clear > kClear && std::isfinite(bit.pattern_gain)) {
@@ -98,6 +102,52 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
     }
   }
   bits_.push_back(bit);
+}
+
+// A picture that moved by m pixels along a line differs from the first by -m times its slope, and by the lamp's gain.
+// Noise and the other direction's slope scatter around that; least squares, then again without what is far off.
+void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vector<float> const& inverse,
+                                   Bit& bit) const {
+  if (black_.empty()) return;
+  auto const first = [&](std::size_t i) { return static_cast<double>(white_[i] + black_[i]); };
+  for (bool const is_row : {true, false}) {
+    struct Sample {
+      double slope, level, change;
+    };
+    std::vector<Sample> samples;
+    for (LineSamples::Line const& line : samples_.lines()) {
+      if (line.is_row != is_row) continue;
+      for (std::size_t i = line.first + 1; i + 1 < line.first + line.length; ++i) {
+        float const slope = 0.5F * (white_[i + 1] + black_[i + 1] - white_[i - 1] - black_[i - 1]);
+        if (std::abs(slope) < kLeastSlope || std::max(white_[i - 1], white_[i + 1]) >= kFullScale) continue;
+        if (white_[i] - black_[i] < kLeastContrast || white_[i] >= kFullScale) continue;
+        double const sum = static_cast<double>(pattern[i] + inverse[i]);
+        samples.push_back({static_cast<double>(slope), first(i), sum - first(i)});
+      }
+    }
+    if (samples.size() < kFewestSamples) continue;
+    double shift = 0, gain = 0, cut = std::numeric_limits<double>::infinity(), std = 0;
+    for (int round = 0; round < 4; ++round) {
+      double ss = 0, sl = 0, ll = 0, sc = 0, lc = 0;
+      for (Sample const& s : samples) {
+        if (std::abs(s.change + shift * s.slope - gain * s.level) > cut) continue;
+        ss += s.slope * s.slope, sl += s.slope * s.level, ll += s.level * s.level;
+        sc += s.slope * s.change, lc += s.level * s.change;
+      }
+      double const determinant = ss * ll - sl * sl;
+      if (!(determinant > 1e-9 * ss * ll)) break;
+      shift = -(sc * ll - lc * sl) / determinant;
+      gain = (lc * ss - sc * sl) / determinant;
+      std::vector<double> errors;
+      for (Sample const& s : samples) errors.push_back(s.change + shift * s.slope - gain * s.level);
+      double const scatter = robust_deviation(std::move(errors));
+      cut = 3 * scatter + samples_.resolution();
+      // Neighbours share an edge's error; a tenth of them counts as independent.
+      std = scatter / std::sqrt(0.1 * ss);
+    }
+    bit.shift[is_row ? 0 : 1] = shift;
+    bit.shift_std[is_row ? 0 : 1] = std;
+  }
 }
 
 SoundnessFigures GraySoundness::finish() {
@@ -157,6 +207,19 @@ SoundnessFigures GraySoundness::finish() {
         fmt::format("the projector's brightness varies by {:.0f} % from picture to picture: let it warm up, or expose "
                     "for whole periods of its frame",
                     100 * figures.flicker));
+
+  for (Bit const& bit : bits_)
+    for (std::size_t along = 0; along < 2; ++along) {
+      double const moved = std::abs(bit.shift[along]);
+      if (!std::isfinite(moved) || bit.shift_std[along] > 0.1 || moved < figures.motion_px) continue;
+      figures.motion_px = moved;
+      figures.motion_std_px = bit.shift_std[along];
+    }
+  if (figures.motion_px > std::max(kMostMotion, 5 * figures.motion_std_px))
+    warn(
+        fmt::format("the scene lies {:.1f} px beside its place in the first picture: the camera or the scene moved "
+                    "while the pictures were taken; fix both, release the camera from afar, and take the view again",
+                    figures.motion_px));
 
   // Each bit has twice the changes of the one before, as long as its stripes can be told apart.
   for (auto const& [first, last] : {std::pair{std::size_t{0}, std::min(options_.column_bits, bits_.size())},

@@ -17,16 +17,6 @@ constexpr double kTailless = 0.65;      // steps: least width of a beam for the 
 constexpr double kUneven = 0.25;        // scatter of the steps beyond which they are called uneven
 constexpr std::size_t kWindow = 6;      // frames on each side that say what is usual
 
-// Standard deviation of a pixel from what changed between two frames: most pixels are not lit in either.
-double noise_between(std::vector<float> const& a, std::vector<float> const& b) {
-  constexpr std::size_t kStride = 11;
-  std::vector<float> changes;
-  for (std::size_t i = 0; i < a.size(); i += kStride) changes.push_back(std::abs(a[i] - b[i]));
-  auto const middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-  std::nth_element(changes.begin(), middle, changes.end());
-  return static_cast<double>(*middle) * 1.4826 / std::sqrt(2.0);
-}
-
 // Distance in units of twice the beam from the share in which two frames overlap; NaN where one is dark.
 double distance(double overlap) { return std::sqrt(-std::log(std::clamp(overlap, kLeastOverlap, 1.0))); }
 
@@ -47,6 +37,22 @@ std::string list(std::vector<std::size_t> const& frames) {
 
 }  // namespace
 
+void ChangeHistogram::add(std::vector<float> const& a, std::vector<float> const& b) {
+  constexpr std::size_t kStride = 11;
+  for (std::size_t i = 0; i < a.size(); i += kStride) {
+    auto const bin = static_cast<std::size_t>(std::abs(a[i] - b[i]) * (kBins - 1) + 0.5F);
+    ++counts_[std::min(bin, kBins - 1)];
+    ++total_;
+  }
+}
+
+double ChangeHistogram::deviation() const {
+  if (total_ == 0) return 0;
+  std::size_t below = 0, bin = 0;
+  while (below + counts_[bin] <= total_ / 2) below += counts_[bin++];
+  return 1.4826 * static_cast<double>(bin) / (kBins - 1);
+}
+
 void SweepSoundness::add(cv::Mat const& frame) {
   auto values = samples_.take(frame);
   if (darkest_.empty()) {
@@ -54,14 +60,14 @@ void SweepSoundness::add(cv::Mat const& frame) {
     saturated_.assign(values.size(), 0);
     identical_.push_back(false);
   } else {
-    noises_.push_back(noise_between(values, last_));
+    changes_.add(values, last_);
     identical_.push_back(values == last_);
     for (std::size_t i = 0; i < values.size(); ++i) darkest_[i] = std::min(darkest_[i], values[i]);
     for (std::size_t i = 0; i < values.size(); ++i) brightest_[i] = std::max(brightest_[i], values[i]);
   }
   for (std::size_t i = 0; i < values.size(); ++i) saturated_[i] += static_cast<std::uint32_t>(values[i] >= kFullScale);
   // Quantisation alone makes 0.29 of a level.
-  noise_ = std::max(noises_.empty() ? 0 : median(noises_), 0.29 * samples_.resolution());
+  noise_ = std::max(changes_.deviation() / std::sqrt(2.0), 0.29 * samples_.resolution());
   last_ = values;
   waiting_.push_back(std::move(values));
   if (waiting_.size() > kDelay) {
