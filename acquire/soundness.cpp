@@ -9,6 +9,14 @@
 #include "base/median.h"
 
 namespace scanview {
+namespace {
+
+constexpr double kMostMotion = 0.3;  // pixels: as much as a rig may be off its rows
+
+}  // namespace
+
+bool SoundnessFigures::moved() const { return motion_px > std::max(kMostMotion, 5 * motion_std_px); }
+
 Json SoundnessFigures::to_json() const {
   return {{"frames", frames},
           {"lit_share", json_number(lit_share)},

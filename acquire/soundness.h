@@ -34,6 +34,7 @@ struct SoundnessFigures {
   std::vector<std::size_t> out_of_order;  ///< frames that are not where they belong
   std::vector<std::string> warnings;      ///< what a person should do something about, whole sentences
 
+  bool moved() const;  ///< motion_px is above 0.3 and significant
   Json to_json() const;
 };
 

@@ -17,7 +17,6 @@ constexpr std::size_t kFewestSamples = 200;
 constexpr double kWrongPair = 0.33;   // of lit pixels: a pair from two bits disagrees at half of them
 constexpr double kClear = 0.6;        // of lit pixels wholly bright or dark: wide stripes
 constexpr float kLeastSlope = 0.02F;  // of a pair's sum, full scales a pixel: enough to see it move
-constexpr double kMostMotion = 0.3;   // pixels: as much as a rig may be off its rows
 
 }  // namespace
 
@@ -104,12 +103,20 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
   bits_.push_back(bit);
 }
 
-// A picture that moved by m pixels along a line differs from the first by -m times its slope, and by the lamp's gain.
-// Noise and the other direction's slope scatter around that; least squares, then again without what is far off.
+// A pair's sum that moved by m pixels along a line differs from the first by -m times their mean slope, and by the
+// lamp's gain. Noise and the other direction's slope scatter around that; least squares, then again without what is far
+// off. One picture's slope would be off by half the shift times its curvature; the mean of both is not.
 void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vector<float> const& inverse,
                                    Bit& bit) const {
   if (black_.empty()) return;
-  auto const first = [&](std::size_t i) { return static_cast<double>(white_[i] + black_[i]); };
+  auto const first = [&](std::size_t i) { return white_[i] + black_[i]; };
+  auto const sum = [&](std::size_t i) { return pattern[i] + inverse[i]; };
+  // Where stripes blur the sum shows the camera's response, and at full scale it shows nothing.
+  auto const tells = [&](std::size_t i) {
+    float const contrast = white_[i] - black_[i];
+    return contrast >= kLeastContrast && std::max({white_[i], pattern[i], inverse[i]}) < kFullScale &&
+           std::abs(pattern[i] - inverse[i]) > 0.6F * contrast;
+  };
   for (bool const is_row : {true, false}) {
     struct Sample {
       double slope, level, change;
@@ -118,11 +125,10 @@ void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vecto
     for (LineSamples::Line const& line : samples_.lines()) {
       if (line.is_row != is_row) continue;
       for (std::size_t i = line.first + 1; i + 1 < line.first + line.length; ++i) {
-        float const slope = 0.5F * (white_[i + 1] + black_[i + 1] - white_[i - 1] - black_[i - 1]);
-        if (std::abs(slope) < kLeastSlope || std::max(white_[i - 1], white_[i + 1]) >= kFullScale) continue;
-        if (white_[i] - black_[i] < kLeastContrast || white_[i] >= kFullScale) continue;
-        double const sum = static_cast<double>(pattern[i] + inverse[i]);
-        samples.push_back({static_cast<double>(slope), first(i), sum - first(i)});
+        float const slope = 0.25F * (first(i + 1) - first(i - 1) + sum(i + 1) - sum(i - 1));
+        if (std::abs(slope) < kLeastSlope || !tells(i - 1) || !tells(i) || !tells(i + 1)) continue;
+        samples.push_back(
+            {static_cast<double>(slope), static_cast<double>(first(i)), static_cast<double>(sum(i) - first(i))});
       }
     }
     if (samples.size() < kFewestSamples) continue;
@@ -215,7 +221,7 @@ SoundnessFigures GraySoundness::finish() {
       figures.motion_px = moved;
       figures.motion_std_px = bit.shift_std[along];
     }
-  if (figures.motion_px > std::max(kMostMotion, 5 * figures.motion_std_px))
+  if (figures.moved())
     warn(
         fmt::format("the scene lies {:.1f} px beside its place in the first picture: the camera or the scene moved "
                     "while the pictures were taken; fix both, release the camera from afar, and take the view again",
