@@ -50,8 +50,8 @@ class LineSamples {
  public:
   static constexpr int kLines = 32;  ///< rows, and as many columns
   /// Gray pictures of 8 or 16 bits, as shares of full scale. Throws Error{bad_input} for another type or, from the
-  /// second picture on, another size.
-  std::vector<float> take(cv::Mat const& picture);
+  /// second picture on, another size. `values` is memory to use again.
+  std::vector<float> take(cv::Mat const& picture, std::vector<float> values = {});
   struct Line {
     std::size_t first = 0, length = 0;
     bool is_row = true;
@@ -63,6 +63,7 @@ class LineSamples {
   cv::Size size_;
   double resolution_ = 1.0 / 255;
   std::vector<Line> lines_;
+  std::vector<int> columns_;  ///< where the lines along columns are
 };
 
 /// How much pixels change from frame to frame, over all frames so far: most are not lit in either, so the median is the
@@ -103,9 +104,10 @@ class SweepSoundness {
   std::string camera_;
   LineSamples samples_;
   std::deque<std::vector<float>> waiting_;  ///< frames whose ambient light is not known yet
-  std::vector<float> darkest_, brightest_, last_;
+  std::vector<float> spare_;                ///< memory of a frame that is done with
+  std::vector<float> darkest_, brightest_;
   std::vector<float> excess_, excess_before_, excess_two_before_;  ///< above the ambient light; 0 where not lit
-  std::vector<std::size_t> lit_;                                   ///< where excess_ is not 0
+  std::vector<std::uint32_t> lit_;                                 ///< where excess_ is not 0
   std::vector<std::uint32_t> saturated_;
   ChangeHistogram changes_;
   std::vector<bool> identical_;
