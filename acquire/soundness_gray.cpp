@@ -13,7 +13,9 @@ namespace {
 constexpr float kFullScale = 0.998F;
 constexpr float kLeastContrast = 0.06F;     // white above black, of full scale
 constexpr std::size_t kMostBlurred = 3000;  // samples a bit for the response
+constexpr std::size_t kMostMoving = 3000;   // samples a pair and direction for the motion
 constexpr std::size_t kFewestSamples = 200;
+constexpr int kGammaSteps = 14;       // halvings of its range: to 0.0003
 constexpr double kWrongPair = 0.33;   // of lit pixels: a pair from two bits disagrees at half of them
 constexpr double kClear = 0.6;        // of lit pixels wholly bright or dark: wide stripes
 constexpr float kLeastSlope = 0.02F;  // of a pair's sum, full scales a pixel: enough to see it move
@@ -131,6 +133,10 @@ void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vecto
             {static_cast<double>(slope), static_cast<double>(first(i)), static_cast<double>(sum(i) - first(i))});
       }
     }
+    // Every so many will do, in place.
+    std::size_t const stride = samples.size() / kMostMoving + 1;
+    for (std::size_t k = 0; k * stride < samples.size(); ++k) samples[k] = samples[k * stride];
+    samples.resize((samples.size() + stride - 1) / stride);
     if (samples.size() < kFewestSamples) continue;
     double shift = 0, gain = 0, cut = std::numeric_limits<double>::infinity(), std = 0;
     for (int round = 0; round < 4; ++round) {
@@ -148,8 +154,8 @@ void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vecto
       for (Sample const& s : samples) errors.push_back(s.change + shift * s.slope - gain * s.level);
       double const scatter = robust_deviation(std::move(errors));
       cut = 3 * scatter + samples_.resolution();
-      // Neighbours share an edge's error; a tenth of them counts as independent.
-      std = scatter / std::sqrt(0.1 * ss);
+      // Neighbours share an edge's error; a tenth of all counts as independent.
+      std = scatter / std::sqrt(std::min(1.0, 0.1 * static_cast<double>(stride)) * ss);
     }
     bit.shift[is_row ? 0 : 1] = shift;
     bit.shift_std[is_row ? 0 : 1] = std;
@@ -255,17 +261,19 @@ SoundnessFigures GraySoundness::finish() {
     }
 
   if (blurred_.size() >= kFewestSamples) {
+    auto const light = [](float value, float gamma) { return std::pow(std::max(0.0F, value), gamma); };
     auto const excess = [&](double gamma) {
+      auto const g = static_cast<float>(gamma);
       std::vector<double> values;
       values.reserve(blurred_.size());
-      auto const light = [&](float value) { return std::pow(std::max(0.0, static_cast<double>(value)), gamma); };
       for (Blurred const& b : blurred_)
-        values.push_back((light(b.pattern) + light(b.inverse) - light(b.white) - light(b.black)) /
-                         (light(b.white) - light(b.black)));
+        values.push_back(
+            static_cast<double>((light(b.pattern, g) + light(b.inverse, g) - light(b.white, g) - light(b.black, g)) /
+                                (light(b.white, g) - light(b.black, g))));
       return values;
     };
     double low = 0.3, high = 5;
-    for (int step = 0; step < 25; ++step) {
+    for (int step = 0; step < kGammaSteps; ++step) {
       double const middle = (low + high) / 2;
       (median(excess(middle)) > 0 ? low : high) = middle;
     }
