@@ -154,6 +154,7 @@ class GraySoundness {
   GraySoundnessOptions options_;
   LineSamples samples_;
   std::vector<float> white_, black_, pattern_;
+  std::vector<float> spare_;  ///< memory of a picture that is done with
   std::vector<Bit> bits_;
   std::vector<Blurred> blurred_;
   std::size_t frames_ = 0;

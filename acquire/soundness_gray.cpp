@@ -12,26 +12,36 @@ namespace {
 
 constexpr float kFullScale = 0.998F;
 constexpr float kLeastContrast = 0.06F;     // white above black, of full scale
-constexpr std::size_t kMostBlurred = 3000;  // samples a bit for the response
-constexpr std::size_t kMostMoving = 3000;   // samples a pair and direction for the motion
+constexpr std::size_t kMostSamples = 3000;  // of a bit, for each of its figures
 constexpr std::size_t kFewestSamples = 200;
 constexpr int kGammaSteps = 14;       // halvings of its range: to 0.0003
 constexpr double kWrongPair = 0.33;   // of lit pixels: a pair from two bits disagrees at half of them
 constexpr double kClear = 0.6;        // of lit pixels wholly bright or dark: wide stripes
 constexpr float kLeastSlope = 0.02F;  // of a pair's sum, full scales a pixel: enough to see it move
 
+/// Keeps evenly spread ones, `most` at most; returns how many were looked at for each.
+template <typename T>
+std::size_t thin(std::vector<T>& values, std::size_t most) {
+  std::size_t const stride = values.size() / most + 1;
+  for (std::size_t k = 0; k * stride < values.size(); ++k) values[k] = values[k * stride];
+  values.resize((values.size() + stride - 1) / stride);
+  return stride;
+}
+
 }  // namespace
 
 void GraySoundness::add(cv::Mat const& picture) {
-  auto values = samples_.take(picture);
+  auto values = samples_.take(picture, std::move(spare_));
   ++frames_;
   if (!options_.inverse) {
     add_bit(values, {});
+    spare_ = std::move(values);
   } else if (pattern_.empty()) {
     pattern_ = std::move(values);
   } else {
     add_bit(pattern_, values);
     pattern_.clear();
+    spare_ = std::move(values);
   }
 }
 
@@ -86,6 +96,8 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
     bit.clear = share(clear);
     if (lines >= 3) bit.transitions = static_cast<double>(changes) / static_cast<double>(lines);
     if (std::min(pattern_gains.size(), inverse_gains.size()) >= kFewestSamples && !inverse.empty()) {
+      thin(pattern_gains, kMostSamples);
+      thin(inverse_gains, kMostSamples);
       bit.pattern_gain = median(std::move(pattern_gains));
       bit.inverse_gain = median(std::move(inverse_gains));
     }
@@ -93,9 +105,8 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
     // Edges between wide stripes only: in fine ones projectors and cameras overshoot. Ties of a wrong pair are no
     // edges.
     if (bit.mismatch < kWrongPair && bit.clear > kClear && std::isfinite(bit.pattern_gain)) {
-      std::size_t const stride = blurred.size() / kMostBlurred + 1;
-      for (std::size_t k = 0; k < blurred.size(); k += stride) {
-        std::size_t const i = blurred[k];
+      thin(blurred, kMostSamples);
+      for (std::size_t const i : blurred) {
         blurred_.push_back({pattern[i] / static_cast<float>(bit.pattern_gain),
                             inverse[i] / static_cast<float>(bit.inverse_gain), white_[i],
                             black_.empty() ? 0 : black_[i]});
@@ -133,10 +144,7 @@ void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vecto
             {static_cast<double>(slope), static_cast<double>(first(i)), static_cast<double>(sum(i) - first(i))});
       }
     }
-    // Every so many will do, in place.
-    std::size_t const stride = samples.size() / kMostMoving + 1;
-    for (std::size_t k = 0; k * stride < samples.size(); ++k) samples[k] = samples[k * stride];
-    samples.resize((samples.size() + stride - 1) / stride);
+    std::size_t const stride = thin(samples, kMostSamples);
     if (samples.size() < kFewestSamples) continue;
     double shift = 0, gain = 0, cut = std::numeric_limits<double>::infinity(), std = 0;
     for (int round = 0; round < 4; ++round) {
