@@ -125,11 +125,14 @@ void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vecto
   auto const first = [&](std::size_t i) { return white_[i] + black_[i]; };
   auto const sum = [&](std::size_t i) { return pattern[i] + inverse[i]; };
   // Where stripes blur the sum shows the camera's response, and at full scale it shows nothing.
-  auto const tells = [&](std::size_t i) {
+  std::vector<std::uint8_t> tells(white_.size());
+  for (std::size_t i = 0; i < tells.size(); ++i) {
     float const contrast = white_[i] - black_[i];
-    return contrast >= kLeastContrast && std::max({white_[i], pattern[i], inverse[i]}) < kFullScale &&
-           std::abs(pattern[i] - inverse[i]) > 0.6F * contrast;
-  };
+    bool const is_clear = std::abs(pattern[i] - inverse[i]) > 0.6F * contrast;
+    bool const is_below = std::max(white_[i], std::max(pattern[i], inverse[i])) < kFullScale;
+    tells[i] = static_cast<std::uint8_t>(contrast >= kLeastContrast) & static_cast<std::uint8_t>(is_clear) &
+               static_cast<std::uint8_t>(is_below);
+  }
   for (bool const is_row : {true, false}) {
     struct Sample {
       double slope, level, change;
@@ -138,8 +141,9 @@ void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vecto
     for (LineSamples::Line const& line : samples_.lines()) {
       if (line.is_row != is_row) continue;
       for (std::size_t i = line.first + 1; i + 1 < line.first + line.length; ++i) {
+        if ((tells[i - 1] & tells[i] & tells[i + 1]) == 0) continue;
         float const slope = 0.25F * (first(i + 1) - first(i - 1) + sum(i + 1) - sum(i - 1));
-        if (std::abs(slope) < kLeastSlope || !tells(i - 1) || !tells(i) || !tells(i + 1)) continue;
+        if (std::abs(slope) < kLeastSlope) continue;
         samples.push_back(
             {static_cast<double>(slope), static_cast<double>(first(i)), static_cast<double>(sum(i) - first(i))});
       }
