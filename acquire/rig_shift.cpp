@@ -215,4 +215,13 @@ RigShift measure_rig_shift(cv::Mat const& left, cv::Mat const& right, cv::Mat1f 
   return result;
 }
 
+void reconcile(RigShift& shift, SoundnessFigures const& left, SoundnessFigures const& right) {
+  double const motion = (left.moved() ? left.motion_px : 0) + (right.moved() ? right.motion_px : 0);
+  if (shift.warning.empty() || !(shift.rms_px <= motion)) return;
+  shift.warning = fmt::format(
+      "matches lie {:.1f} px off their rows, no more than the camera or the scene moved between the pictures: take the "
+      "view again before the rig is doubted",
+      shift.rms_px);
+}
+
 }  // namespace scanview

@@ -3,6 +3,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "acquire/soundness.h"
 #include "base/context.h"
 #include "base/files.h"
 
@@ -30,5 +31,9 @@ struct RigShift {
 /// and NaN. Takes milliseconds for some thousand places. Throws Error{bad_input} for other types or sizes.
 RigShift measure_rig_shift(cv::Mat const& left, cv::Mat const& right, cv::Mat1f const& x_right, Context& context,
                            int most_px = 4);
+
+/// What the motion of a Gray capture explains is not blamed on the rig: texture comes from its first pictures, codes
+/// from the later ones, so that each camera's motion moves matches off their rows by as much.
+void reconcile(RigShift& shift, SoundnessFigures const& left, SoundnessFigures const& right);
 
 }  // namespace scanview

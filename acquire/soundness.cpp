@@ -9,6 +9,14 @@
 #include "base/median.h"
 
 namespace scanview {
+namespace {
+
+constexpr double kMostMotion = 0.3;  // pixels: as much as a rig may be off its rows
+
+}  // namespace
+
+bool SoundnessFigures::moved() const { return motion_px > std::max(kMostMotion, 5 * motion_std_px); }
+
 Json SoundnessFigures::to_json() const {
   return {{"frames", frames},
           {"lit_share", json_number(lit_share)},
@@ -20,6 +28,8 @@ Json SoundnessFigures::to_json() const {
           {"step_scatter", json_number(step_scatter)},
           {"gamma", json_number(gamma)},
           {"gamma_std", json_number(gamma_std)},
+          {"motion_px", json_number(motion_px)},
+          {"motion_std_px", json_number(motion_std_px)},
           {"pair_mismatch", json_number(pair_mismatch)},
           {"doubled", doubled},
           {"missing", missing},
@@ -27,7 +37,7 @@ Json SoundnessFigures::to_json() const {
           {"warnings", warnings}};
 }
 
-std::vector<float> LineSamples::take(cv::Mat const& picture) {
+std::vector<float> LineSamples::take(cv::Mat const& picture, std::vector<float> values) {
   if (picture.type() != CV_8UC1 && picture.type() != CV_16UC1)
     throw Error(ErrorCode::bad_input, {}, "a frame is not gray with 8 or 16 bits");
   if (lines_.empty()) {
@@ -38,14 +48,15 @@ std::vector<float> LineSamples::take(cv::Mat const& picture) {
         auto const length = static_cast<std::size_t>(is_row ? size_.width : size_.height);
         lines_.push_back({first, length, is_row});
         first += length;
+        if (!is_row) columns_.push_back((2 * i + 1) * size_.width / (2 * std::min(kLines, size_.width)));
       }
   }
   if (picture.size() != size_)
     throw Error(ErrorCode::bad_input, {},
                 fmt::format("a frame has {}x{} pixels, those before it {}x{}", picture.cols, picture.rows, size_.width,
                             size_.height));
-  int const rows = std::min(kLines, size_.height), columns = std::min(kLines, size_.width);
-  std::vector<float> values(lines_.back().first + lines_.back().length);
+  int const rows = std::min(kLines, size_.height);
+  values.resize(lines_.back().first + lines_.back().length);
   auto const copy = [&]<typename T>(T) {
     auto const scale = static_cast<float>(1.0 / std::numeric_limits<T>::max());
     resolution_ = static_cast<double>(scale);
@@ -57,8 +68,11 @@ std::vector<float> LineSamples::take(cv::Mat const& picture) {
     // All columns of a row at once, which touches every line of memory once.
     for (int y = 0; y < size_.height; ++y, ++to) {
       T const* const from = picture.ptr<T>(y);
-      for (int i = 0; i < columns; ++i)
-        to[i * size_.height] = scale * static_cast<float>(from[(2 * i + 1) * size_.width / (2 * columns)]);
+      float* down = to;
+      for (int const x : columns_) {
+        *down = scale * static_cast<float>(from[x]);
+        down += size_.height;
+      }
     }
   };
   picture.depth() == CV_8U ? copy(std::uint8_t{}) : copy(std::uint16_t{});

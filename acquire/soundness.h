@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -25,12 +26,15 @@ struct SoundnessFigures {
   double step_scatter = kNone;     ///< standard deviation of the light's step, relative (sweep)
   double gamma = kNone;            ///< value = light^(1 / gamma); 1 is linear (gray)
   double gamma_std = kNone;
+  double motion_px = kNone;  ///< largest shift of a pair's picture against the first picture (gray)
+  double motion_std_px = kNone;
   double pair_mismatch = kNone;           ///< largest share of lit pixels where pattern + inverse is not white + black
   std::vector<std::size_t> doubled;       ///< frames that show the same light as the one before
   std::vector<std::size_t> missing;       ///< a frame is missing before this one
   std::vector<std::size_t> out_of_order;  ///< frames that are not where they belong
   std::vector<std::string> warnings;      ///< what a person should do something about, whole sentences
 
+  bool moved() const;  ///< motion_px is above 0.3 and significant
   Json to_json() const;
 };
 
@@ -46,8 +50,8 @@ class LineSamples {
  public:
   static constexpr int kLines = 32;  ///< rows, and as many columns
   /// Gray pictures of 8 or 16 bits, as shares of full scale. Throws Error{bad_input} for another type or, from the
-  /// second picture on, another size.
-  std::vector<float> take(cv::Mat const& picture);
+  /// second picture on, another size. `values` is memory to use again.
+  std::vector<float> take(cv::Mat const& picture, std::vector<float> values = {});
   struct Line {
     std::size_t first = 0, length = 0;
     bool is_row = true;
@@ -59,6 +63,20 @@ class LineSamples {
   cv::Size size_;
   double resolution_ = 1.0 / 255;
   std::vector<Line> lines_;
+  std::vector<int> columns_;  ///< where the lines along columns are
+};
+
+/// How much pixels change from frame to frame, over all frames so far: most are not lit in either, so the median is the
+/// camera's noise. A frame costs its samples only, however many came before.
+class ChangeHistogram {
+ public:
+  void add(std::vector<float> const& a, std::vector<float> const& b);
+  double deviation() const;  ///< of a change, share of full scale, to 1 / 4080; 0 before the first
+
+ private:
+  static constexpr std::size_t kBins = 4081;  // sixteen a level of 8 bits
+  std::vector<std::uint32_t> counts_ = std::vector<std::uint32_t>(kBins);
+  std::size_t total_ = 0;
 };
 
 /// A light swept over the scene: feed the frames in order, then ask. How far the light went between two frames is
@@ -86,11 +104,12 @@ class SweepSoundness {
   std::string camera_;
   LineSamples samples_;
   std::deque<std::vector<float>> waiting_;  ///< frames whose ambient light is not known yet
-  std::vector<float> darkest_, brightest_, last_;
+  std::vector<float> spare_;                ///< memory of a frame that is done with
+  std::vector<float> darkest_, brightest_;
   std::vector<float> excess_, excess_before_, excess_two_before_;  ///< above the ambient light; 0 where not lit
-  std::vector<std::size_t> lit_;                                   ///< where excess_ is not 0
+  std::vector<std::uint32_t> lit_;                                 ///< where excess_ is not 0
   std::vector<std::uint32_t> saturated_;
-  std::vector<double> noises_;
+  ChangeHistogram changes_;
   std::vector<bool> identical_;
   std::vector<Step> steps_;
   double noise_ = 0;
@@ -103,7 +122,8 @@ struct GraySoundnessOptions {
 
 /// Gray code: white and black first where there are any, then the pattern pictures in order. Pattern and inverse must
 /// add up to white and black, the stripes of each bit must be half as wide as those of the bit before, and where
-/// stripes blur into each other the sum tells whether values are proportional to light.
+/// stripes blur into each other the sum tells whether values are proportional to light. The sum of a pair also shows
+/// the scene's own paint: where it is shifted along its own slope, the camera or the scene moved meanwhile.
 class GraySoundness {
  public:
   GraySoundness(std::string camera, GraySoundnessOptions const& options)
@@ -121,16 +141,20 @@ class GraySoundness {
     double equal = 0;        ///< share of lit pixels that are equal in both
     double clear = 0;        ///< share of lit pixels that are wholly bright or dark
     double transitions = 0;  ///< changes a line
+    std::array<double, 2> shift = {SoundnessFigures::kNone, SoundnessFigures::kNone};  ///< along rows, columns: pixels
+    std::array<double, 2> shift_std = {SoundnessFigures::kNone, SoundnessFigures::kNone};
   };
   struct Blurred {
     float pattern, inverse, white, black;
   };
   void add_bit(std::vector<float> const& pattern, std::vector<float> const& inverse);
+  void measure_motion(std::vector<float> const& pattern, std::vector<float> const& inverse, Bit& bit) const;
 
   std::string camera_;
   GraySoundnessOptions options_;
   LineSamples samples_;
   std::vector<float> white_, black_, pattern_;
+  std::vector<float> spare_;  ///< memory of a picture that is done with
   std::vector<Bit> bits_;
   std::vector<Blurred> blurred_;
   std::size_t frames_ = 0;

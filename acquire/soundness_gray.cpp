@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "acquire/soundness.h"
 #include "base/median.h"
@@ -11,23 +12,36 @@ namespace {
 
 constexpr float kFullScale = 0.998F;
 constexpr float kLeastContrast = 0.06F;     // white above black, of full scale
-constexpr std::size_t kMostBlurred = 3000;  // samples a bit for the response
+constexpr std::size_t kMostSamples = 3000;  // of a bit, for each of its figures
 constexpr std::size_t kFewestSamples = 200;
-constexpr double kWrongPair = 0.33;  // of lit pixels: a pair from two bits disagrees at half of them
-constexpr double kClear = 0.6;       // of lit pixels wholly bright or dark: wide stripes
+constexpr int kGammaSteps = 14;       // halvings of its range: to 0.0003
+constexpr double kWrongPair = 0.33;   // of lit pixels: a pair from two bits disagrees at half of them
+constexpr double kClear = 0.6;        // of lit pixels wholly bright or dark: wide stripes
+constexpr float kLeastSlope = 0.02F;  // of a pair's sum, full scales a pixel: enough to see it move
+
+/// Keeps evenly spread ones, `most` at most; returns how many were looked at for each.
+template <typename T>
+std::size_t thin(std::vector<T>& values, std::size_t most) {
+  std::size_t const stride = values.size() / most + 1;
+  for (std::size_t k = 0; k * stride < values.size(); ++k) values[k] = values[k * stride];
+  values.resize((values.size() + stride - 1) / stride);
+  return stride;
+}
 
 }  // namespace
 
 void GraySoundness::add(cv::Mat const& picture) {
-  auto values = samples_.take(picture);
+  auto values = samples_.take(picture, std::move(spare_));
   ++frames_;
   if (!options_.inverse) {
     add_bit(values, {});
+    spare_ = std::move(values);
   } else if (pattern_.empty()) {
     pattern_ = std::move(values);
   } else {
     add_bit(pattern_, values);
     pattern_.clear();
+    spare_ = std::move(values);
   }
 }
 
@@ -82,15 +96,17 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
     bit.clear = share(clear);
     if (lines >= 3) bit.transitions = static_cast<double>(changes) / static_cast<double>(lines);
     if (std::min(pattern_gains.size(), inverse_gains.size()) >= kFewestSamples && !inverse.empty()) {
+      thin(pattern_gains, kMostSamples);
+      thin(inverse_gains, kMostSamples);
       bit.pattern_gain = median(std::move(pattern_gains));
       bit.inverse_gain = median(std::move(inverse_gains));
     }
+    if (bit.mismatch < kWrongPair && bit.clear > kClear && !inverse.empty()) measure_motion(pattern, inverse, bit);
     // Edges between wide stripes only: in fine ones projectors and cameras overshoot. Ties of a wrong pair are no
     // edges.
     if (bit.mismatch < kWrongPair && bit.clear > kClear && std::isfinite(bit.pattern_gain)) {
-      std::size_t const stride = blurred.size() / kMostBlurred + 1;
-      for (std::size_t k = 0; k < blurred.size(); k += stride) {
-        std::size_t const i = blurred[k];
+      thin(blurred, kMostSamples);
+      for (std::size_t const i : blurred) {
         blurred_.push_back({pattern[i] / static_cast<float>(bit.pattern_gain),
                             inverse[i] / static_cast<float>(bit.inverse_gain), white_[i],
                             black_.empty() ? 0 : black_[i]});
@@ -98,6 +114,64 @@ void GraySoundness::add_bit(std::vector<float> const& pattern, std::vector<float
     }
   }
   bits_.push_back(bit);
+}
+
+// A pair's sum that moved by m pixels along a line differs from the first by -m times their mean slope, and by the
+// lamp's gain. Noise and the other direction's slope scatter around that; least squares, then again without what is far
+// off. One picture's slope would be off by half the shift times its curvature; the mean of both is not.
+void GraySoundness::measure_motion(std::vector<float> const& pattern, std::vector<float> const& inverse,
+                                   Bit& bit) const {
+  if (black_.empty()) return;
+  auto const first = [&](std::size_t i) { return white_[i] + black_[i]; };
+  auto const sum = [&](std::size_t i) { return pattern[i] + inverse[i]; };
+  // Where stripes blur the sum shows the camera's response, and at full scale it shows nothing.
+  std::vector<std::uint8_t> tells(white_.size());
+  for (std::size_t i = 0; i < tells.size(); ++i) {
+    float const contrast = white_[i] - black_[i];
+    bool const is_clear = std::abs(pattern[i] - inverse[i]) > 0.6F * contrast;
+    bool const is_below = std::max(white_[i], std::max(pattern[i], inverse[i])) < kFullScale;
+    tells[i] = static_cast<std::uint8_t>(contrast >= kLeastContrast) & static_cast<std::uint8_t>(is_clear) &
+               static_cast<std::uint8_t>(is_below);
+  }
+  for (bool const is_row : {true, false}) {
+    struct Sample {
+      double slope, level, change;
+    };
+    std::vector<Sample> samples;
+    for (LineSamples::Line const& line : samples_.lines()) {
+      if (line.is_row != is_row) continue;
+      for (std::size_t i = line.first + 1; i + 1 < line.first + line.length; ++i) {
+        if ((tells[i - 1] & tells[i] & tells[i + 1]) == 0) continue;
+        float const slope = 0.25F * (first(i + 1) - first(i - 1) + sum(i + 1) - sum(i - 1));
+        if (std::abs(slope) < kLeastSlope) continue;
+        samples.push_back(
+            {static_cast<double>(slope), static_cast<double>(first(i)), static_cast<double>(sum(i) - first(i))});
+      }
+    }
+    std::size_t const stride = thin(samples, kMostSamples);
+    if (samples.size() < kFewestSamples) continue;
+    double shift = 0, gain = 0, cut = std::numeric_limits<double>::infinity(), std = 0;
+    for (int round = 0; round < 4; ++round) {
+      double ss = 0, sl = 0, ll = 0, sc = 0, lc = 0;
+      for (Sample const& s : samples) {
+        if (std::abs(s.change + shift * s.slope - gain * s.level) > cut) continue;
+        ss += s.slope * s.slope, sl += s.slope * s.level, ll += s.level * s.level;
+        sc += s.slope * s.change, lc += s.level * s.change;
+      }
+      double const determinant = ss * ll - sl * sl;
+      if (!(determinant > 1e-9 * ss * ll)) break;
+      shift = -(sc * ll - lc * sl) / determinant;
+      gain = (lc * ss - sc * sl) / determinant;
+      std::vector<double> errors;
+      for (Sample const& s : samples) errors.push_back(s.change + shift * s.slope - gain * s.level);
+      double const scatter = robust_deviation(std::move(errors));
+      cut = 3 * scatter + samples_.resolution();
+      // Neighbours share an edge's error; a tenth of all counts as independent.
+      std = scatter / std::sqrt(std::min(1.0, 0.1 * static_cast<double>(stride)) * ss);
+    }
+    bit.shift[is_row ? 0 : 1] = shift;
+    bit.shift_std[is_row ? 0 : 1] = std;
+  }
 }
 
 SoundnessFigures GraySoundness::finish() {
@@ -158,6 +232,19 @@ SoundnessFigures GraySoundness::finish() {
                     "for whole periods of its frame",
                     100 * figures.flicker));
 
+  for (Bit const& bit : bits_)
+    for (std::size_t along = 0; along < 2; ++along) {
+      double const moved = std::abs(bit.shift[along]);
+      if (!std::isfinite(moved) || bit.shift_std[along] > 0.1 || moved < figures.motion_px) continue;
+      figures.motion_px = moved;
+      figures.motion_std_px = bit.shift_std[along];
+    }
+  if (figures.moved())
+    warn(
+        fmt::format("the scene lies {:.1f} px beside its place in the first picture: the camera or the scene moved "
+                    "while the pictures were taken; fix both, release the camera from afar, and take the view again",
+                    figures.motion_px));
+
   // Each bit has twice the changes of the one before, as long as its stripes can be told apart.
   for (auto const& [first, last] : {std::pair{std::size_t{0}, std::min(options_.column_bits, bits_.size())},
                                     std::pair{std::min(options_.column_bits, bits_.size()), bits_.size()}})
@@ -186,17 +273,19 @@ SoundnessFigures GraySoundness::finish() {
     }
 
   if (blurred_.size() >= kFewestSamples) {
+    auto const light = [](float value, float gamma) { return std::pow(std::max(0.0F, value), gamma); };
     auto const excess = [&](double gamma) {
+      auto const g = static_cast<float>(gamma);
       std::vector<double> values;
       values.reserve(blurred_.size());
-      auto const light = [&](float value) { return std::pow(std::max(0.0, static_cast<double>(value)), gamma); };
       for (Blurred const& b : blurred_)
-        values.push_back((light(b.pattern) + light(b.inverse) - light(b.white) - light(b.black)) /
-                         (light(b.white) - light(b.black)));
+        values.push_back(
+            static_cast<double>((light(b.pattern, g) + light(b.inverse, g) - light(b.white, g) - light(b.black, g)) /
+                                (light(b.white, g) - light(b.black, g))));
       return values;
     };
     double low = 0.3, high = 5;
-    for (int step = 0; step < 25; ++step) {
+    for (int step = 0; step < kGammaSteps; ++step) {
       double const middle = (low + high) / 2;
       (median(excess(middle)) > 0 ? low : high) = middle;
     }

@@ -9,23 +9,14 @@
 namespace scanview {
 namespace {
 
-constexpr std::size_t kDelay = 6;  // frames after which the beam has left a pixel
+constexpr std::size_t kDelay = 6;          // frames after which the beam has left a pixel
+constexpr std::size_t kAmbientStride = 7;  // between samples that the room's light is averaged over
 constexpr float kFullScale = 0.998F;
 constexpr double kLeastLit = 0.03;      // of full scale: a change that a beam makes
 constexpr double kLeastOverlap = 0.02;  // below, the frames are just far apart
 constexpr double kTailless = 0.65;      // steps: least width of a beam for the lamp's brightness
 constexpr double kUneven = 0.25;        // scatter of the steps beyond which they are called uneven
 constexpr std::size_t kWindow = 6;      // frames on each side that say what is usual
-
-// Standard deviation of a pixel from what changed between two frames: most pixels are not lit in either.
-double noise_between(std::vector<float> const& a, std::vector<float> const& b) {
-  constexpr std::size_t kStride = 11;
-  std::vector<float> changes;
-  for (std::size_t i = 0; i < a.size(); i += kStride) changes.push_back(std::abs(a[i] - b[i]));
-  auto const middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-  std::nth_element(changes.begin(), middle, changes.end());
-  return static_cast<double>(*middle) * 1.4826 / std::sqrt(2.0);
-}
 
 // Distance in units of twice the beam from the share in which two frames overlap; NaN where one is dark.
 double distance(double overlap) { return std::sqrt(-std::log(std::clamp(overlap, kLeastOverlap, 1.0))); }
@@ -47,25 +38,42 @@ std::string list(std::vector<std::size_t> const& frames) {
 
 }  // namespace
 
+void ChangeHistogram::add(std::vector<float> const& a, std::vector<float> const& b) {
+  constexpr std::size_t kStride = 11;
+  for (std::size_t i = 0; i < a.size(); i += kStride) {
+    auto const bin = static_cast<std::size_t>(std::abs(a[i] - b[i]) * (kBins - 1) + 0.5F);
+    ++counts_[std::min(bin, kBins - 1)];
+    ++total_;
+  }
+}
+
+double ChangeHistogram::deviation() const {
+  if (total_ == 0) return 0;
+  std::size_t below = 0, bin = 0;
+  while (below + counts_[bin] <= total_ / 2) below += counts_[bin++];
+  return 1.4826 * static_cast<double>(bin) / (kBins - 1);
+}
+
 void SweepSoundness::add(cv::Mat const& frame) {
-  auto values = samples_.take(frame);
+  auto values = samples_.take(frame, std::move(spare_));
   if (darkest_.empty()) {
     darkest_ = brightest_ = values;
     saturated_.assign(values.size(), 0);
     identical_.push_back(false);
   } else {
-    noises_.push_back(noise_between(values, last_));
-    identical_.push_back(values == last_);
+    auto const& last = waiting_.back();
+    changes_.add(values, last);
+    identical_.push_back(values == last);
     for (std::size_t i = 0; i < values.size(); ++i) darkest_[i] = std::min(darkest_[i], values[i]);
     for (std::size_t i = 0; i < values.size(); ++i) brightest_[i] = std::max(brightest_[i], values[i]);
   }
   for (std::size_t i = 0; i < values.size(); ++i) saturated_[i] += static_cast<std::uint32_t>(values[i] >= kFullScale);
   // Quantisation alone makes 0.29 of a level.
-  noise_ = std::max(noises_.empty() ? 0 : median(noises_), 0.29 * samples_.resolution());
-  last_ = values;
+  noise_ = std::max(changes_.deviation() / std::sqrt(2.0), 0.29 * samples_.resolution());
   waiting_.push_back(std::move(values));
   if (waiting_.size() > kDelay) {
     evaluate(waiting_.front());
+    spare_ = std::move(waiting_.front());
     waiting_.pop_front();
   }
 }
@@ -74,24 +82,32 @@ void SweepSoundness::evaluate(std::vector<float> const& frame) {
   // The oldest is cleared and becomes the newest.
   std::swap(excess_two_before_, excess_before_);
   std::swap(excess_before_, excess_);
-  excess_.assign(frame.size(), 0);
-  lit_.clear();
+  excess_.resize(frame.size());
+  lit_.resize(frame.size());
   // The darkest of many noisy values lies about two deviations below their mean.
   auto const bias = static_cast<float>(2 * noise_), least = static_cast<float>(5 * noise_ + 0.01);
-  Step step;
-  double dark = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     float const above = frame[i] - darkest_[i] - bias;
-    if (above > least) {
-      excess_[i] = above;
-      lit_.push_back(i);
-    } else {
-      dark += static_cast<double>(above);
-    }
+    excess_[i] = above > least ? above : 0;
   }
-  std::size_t const k = steps_.size(), dark_count = frame.size() - lit_.size();
+  // No branch, which would be mispredicted at every rim of the light.
+  std::size_t lit = 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    lit_[lit] = static_cast<std::uint32_t>(i);
+    lit += excess_[i] > 0 ? 1 : 0;
+  }
+  lit_.resize(lit);
+  Step step;
+  double dark = 0;
+  std::size_t dark_count = 0;
+  for (std::size_t i = 0; i < frame.size(); i += kAmbientStride) {
+    if (excess_[i] > 0) continue;
+    dark += static_cast<double>(frame[i] - darkest_[i] - bias);
+    ++dark_count;
+  }
+  std::size_t const k = steps_.size();
   step.identical = identical_[k];
-  if (dark_count > frame.size() / 4) step.ambient = dark / static_cast<double>(dark_count);
+  if (kAmbientStride * dark_count > frame.size() / 4) step.ambient = dark / static_cast<double>(dark_count);
   auto const product = [&](std::vector<float> const& other) {
     double sum = 0;
     for (std::size_t const i : lit_) sum += static_cast<double>(excess_[i]) * static_cast<double>(other[i]);
@@ -102,14 +118,14 @@ void SweepSoundness::evaluate(std::vector<float> const& frame) {
   if (k >= 2) {
     step.overlap_two = product(excess_two_before_);
     auto const clear = static_cast<float>(std::max(12 * noise_, 0.02));
-    std::vector<double> curvatures;
+    std::vector<double> ratios;  // one logarithm, of their median
     for (std::size_t const i : lit_) {
       float const before = excess_two_before_[i], middle = excess_before_[i], after = excess_[i];
       if (before < clear || middle < clear || after < clear || brightest_[i] >= kFullScale) continue;
-      curvatures.push_back(std::log(static_cast<double>(before) * static_cast<double>(after) /
-                                    (static_cast<double>(middle) * static_cast<double>(middle))));
+      ratios.push_back(static_cast<double>(before) * static_cast<double>(after) /
+                       (static_cast<double>(middle) * static_cast<double>(middle)));
     }
-    if (curvatures.size() >= 30) step.curvature = median(std::move(curvatures));
+    if (ratios.size() >= 30) step.curvature = std::log(median(std::move(ratios)));
   }
   steps_.push_back(step);
 }

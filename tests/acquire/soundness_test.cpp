@@ -17,13 +17,15 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 constexpr int kWidth = 240, kHeight = 80, kFrames = 48;
 
 /// Bright and dark paint with edges.
-double paint(int x, int y) {
-  return (0.55 + 0.35 * std::sin(0.21 * x) * std::cos(0.13 * y)) * ((x / 37 + y / 23) % 3 == 0 ? 0.4 : 1);
+double paint(double x, double y) {
+  bool const is_dark = (static_cast<int>(x) / 37 + static_cast<int>(y) / 23) % 3 == 0;
+  return (0.55 + 0.35 * std::sin(0.21 * x) * std::cos(0.13 * y)) * (is_dark ? 0.4 : 1);
 }
 
 /// When the light passes a pixel, in frames: a curved surface, and a box in front of it.
@@ -180,8 +182,10 @@ TEST(SweepSoundness, DarkOrFewFramesAreNoCrash) {
 constexpr int kBits = 7;  // 128 columns over the picture: stripes of the finest are four pixels wide
 
 struct GrayFaults {
+  std::function<double(double, double)> paint = scanview::paint;
   double blur = 1.0, noise = 1, gamma = 1, exposure = 200;
   std::function<double(int)> gain = [](int) { return 1.0; };
+  cv::Point2d moved;  ///< white and black were taken with the scene so many pixels beside its place
   std::uint64_t seed = 1;
 };
 
@@ -200,7 +204,9 @@ cv::Mat1b gray_picture(GrayFaults const& faults, int number) {
   CounterRandom random(faults.seed, static_cast<std::uint64_t>(number + 10));
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
-      double const seen = paint(x, y) * (0.05 + 0.9 * faults.gain(number) * static_cast<double>(light(y, x)));
+      cv::Point2d const at = cv::Point2d(x, y) - (number < 0 ? faults.moved : cv::Point2d());
+      double const seen =
+          faults.paint(at.x, at.y) * (0.05 + 0.9 * faults.gain(number) * static_cast<double>(light(y, x)));
       picture(y, x) = cv::saturate_cast<std::uint8_t>(faults.exposure * std::pow(seen, 1 / faults.gamma) +
                                                       faults.noise * random.normal());
     }
@@ -269,6 +275,61 @@ TEST(GraySoundness, FlickerAndOverexposureAreMeasured) {
   EXPECT_THAT(gray(bright).warnings, testing::Contains(HasSubstr("at full scale")));
 }
 
+/// Paint with slopes everywhere, as a cloth has them.
+double cloth(double x, double y) {
+  return 0.6 + 0.2 * std::sin(0.45 * x + 0.2 * y) + 0.19 * std::sin(0.5 * y - 0.11 * x);
+}
+
+TEST(GraySoundness, ASceneThatMovedAfterTheFirstPicturesIsMeasured) {
+  struct Case {
+    cv::Point2d moved;
+    double gamma, exposure;
+  };
+  // At an exposure of 400 a third of the paint is at full scale.
+  for (auto const& [moved, gamma, exposure] : {Case{{1, 0}, 1, 200},
+                                               {{0, -1}, 1, 200},
+                                               {{0, 1.3}, 1, 200},
+                                               {{-0.6, 0}, 1, 200},
+                                               {{1, 0}, 2.2, 200},
+                                               {{0, -1}, 1, 400}})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      GrayFaults faults;
+      faults.paint = cloth;
+      faults.moved = moved;
+      faults.gamma = gamma;
+      faults.exposure = exposure;
+      faults.seed = seed;
+      auto const figures = gray(faults);
+      // Paint has up to ω = 0.5 a pixel along a line: the central difference is ω² / 6 too small, the mean of two
+      // slopes (ω size)² / 12. Noise: the largest of a dozen figures.
+      double const size = std::hypot(moved.x, moved.y);
+      double const excess = 0.25 / 6 + 0.25 * size * size / 12;
+      EXPECT_NEAR(figures.motion_px, size, excess * size + 4 * figures.motion_std_px) << figures.to_json().dump();
+      EXPECT_LT(figures.motion_std_px, 0.1);
+      EXPECT_TRUE(figures.moved());
+      EXPECT_THAT(figures.warnings, testing::Contains(HasSubstr("beside its place")));
+    }
+}
+
+TEST(GraySoundness, GammaFlickerNoiseAndPaintAreNoMotion) {
+  std::uint64_t seed = 0;
+  for (double const gamma : {0.7, 1.0, 2.2})
+    for (double const flicker : {0.0, 0.08})
+      for (bool const is_cloth : {false, true}) {
+        GrayFaults faults;
+        if (is_cloth) faults.paint = cloth;
+        faults.seed = ++seed;
+        faults.gamma = gamma;
+        faults.noise = seed % 3 == 0 ? 0 : 2.5;
+        faults.exposure = seed % 2 == 0 ? 200 : 400;
+        faults.gain = [&](int k) {
+          return 1 + flicker * CounterRandom(seed, static_cast<std::uint64_t>(k + 3)).normal();
+        };
+        auto const figures = gray(faults);
+        EXPECT_FALSE(figures.moved()) << "seed " << seed << ": " << figures.to_json().dump();
+      }
+}
+
 /// A picture with detail, at any place.
 double texture(double x, double y) {
   return 120 + 40 * std::sin(0.61 * x + 0.3 * y) + 35 * std::sin(0.17 * x - 0.52 * y) +
@@ -320,6 +381,26 @@ TEST(RigShift, RollIsMeasured) {
   EXPECT_NEAR(shift.tilt_px, 3, 0.2);
   EXPECT_NEAR(shift.offset_px, -3 * 18.0 / 320, 0.1);
   EXPECT_THAT(shift.warning, HasSubstr("viewing axis"));
+}
+
+TEST(RigShift, MotionBetweenThePicturesIsNotBlamedOnTheRig) {
+  auto const pitch = shifted([](int, int) { return 0.8; }, 2, 4);
+  SoundnessFigures still, moved;
+  still.motion_px = moved.motion_px = 1.1;
+  still.motion_std_px = 0.5;
+  moved.motion_std_px = 0.05;
+  RigShift explained = pitch, calibration = pitch, both = shifted([](int, int) { return 2.4; }, 2, 4);
+  reconcile(explained, moved, still);
+  EXPECT_THAT(explained.warning, HasSubstr("take the view again"));
+  EXPECT_THAT(explained.warning, Not(HasSubstr("calibrat")));
+  EXPECT_EQ(explained.rms_px, pitch.rms_px);
+  reconcile(calibration, still, still);
+  EXPECT_EQ(calibration.warning, pitch.warning);
+  reconcile(both, moved, still);  // more than the motion can explain
+  EXPECT_THAT(both.warning, HasSubstr("calibrate again"));
+  RigShift silent = shifted([](int, int) { return 0.0; }, 2, 4);
+  reconcile(silent, moved, moved);
+  EXPECT_THAT(silent.warning, IsEmpty());
 }
 
 TEST(RigShift, WithoutTextureOrMatchesNothingIsClaimed) {
