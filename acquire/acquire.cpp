@@ -177,7 +177,7 @@ class Acquisition {
     figures.ambiguous = match.ambiguous;
     figures.sheet_scatter = match.sheet_scatter;
     if (!left.rows.empty() && !right.rows.empty()) check_rows(image, left.rows, right.rows, geometry, figures);
-    measure_shift(image, left.image.lit, right.image.lit, geometry, figures);
+    measure_shift(image, sides, geometry, figures);
     cv::cvtColor(left.image.lit, image.color, cv::COLOR_GRAY2BGR);
     return image;
   }
@@ -221,8 +221,7 @@ class Acquisition {
   }
 
   /// Whether texture lies on the rows where the calibration has it.
-  void measure_shift(RangeImage const& image, cv::Mat1b const& lit_left, cv::Mat1b const& lit_right,
-                     Geometry const& geometry, AcquiredView& figures) {
+  void measure_shift(RangeImage const& image, Sides const& sides, Geometry const& geometry, AcquiredView& figures) {
     Rectification const& r = geometry.rectification;
     cv::Mat1b left, right;
     auto const whole = [](PictureMap const& map) {
@@ -234,8 +233,10 @@ class Acquisition {
       }
       return all;
     };
-    cv::remap(lit_left, left, whole(geometry.left_row_map), cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-    cv::remap(lit_right, right, whole(geometry.right_row_map), cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    cv::remap(sides[0].image.lit, left, whole(geometry.left_row_map), cv::noArray(), cv::INTER_LINEAR,
+              cv::BORDER_CONSTANT);
+    cv::remap(sides[1].image.lit, right, whole(geometry.right_row_map), cv::noArray(), cv::INTER_LINEAR,
+              cv::BORDER_CONSTANT);
     cv::Mat1f x_right(left.size(), kMissing);
     for (int y = 0; y < image.depth.rows; ++y)
       for (int x = 0; x < image.depth.cols; ++x) {
@@ -247,7 +248,8 @@ class Acquisition {
         Eigen::Vector2d const there = r.right.project(p - Eigen::Vector3d(r.baseline, 0, 0));
         x_right(pixel) = static_cast<float>(there.x() + pixel.x - at.x());
       }
-    RigShift const shift = measure_rig_shift(left, right, x_right, context_);
+    RigShift shift = measure_rig_shift(left, right, x_right, context_);
+    reconcile(shift, sides[0].soundness, sides[1].soundness);
     figures.soundness["rig"] = shift.to_json();
     if (!shift.warning.empty()) figures.warnings.push_back(shift.warning);
   }
