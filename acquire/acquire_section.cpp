@@ -34,13 +34,14 @@ std::string measured(double value, char const* format) {
 std::string missing_table(AcquireResult const& result) {
   std::vector<std::vector<std::string>> table = {{"view", "depths", "found of decodable", "no light", "saturated",
                                                   "several peaks", "no partner", "inconsistent", "background",
-                                                  "out of range", "outlier"}};
+                                                  "out of range", "outlier", "outside"}};
   for (std::size_t v = 0; v < result.views.size(); ++v) {
     auto const& view = result.views[v];
     std::vector<std::string> row = {view.name, std::to_string(view.depths),
                                     percent(view.depths + view.background_removed, view.decodable)};
     for (auto const& [pixel, name] : kWhyMissing)
       row.push_back(std::to_string(count_class(result.set.views[v].image, pixel)));
+    row.push_back(std::to_string(count_class(result.set.views[v].image, PixelClass::no_depth)));
     table.push_back(row);
   }
   return html_table(table);
@@ -119,7 +120,8 @@ ReportSection acquire_section(AcquireResult const& result) {
                         {PixelClass::inconsistent, "inconsistent"},
                         {PixelClass::background, "background"},
                         {PixelClass::cut, "out of range"},
-                        {PixelClass::outlier, "outlier"}});
+                        {PixelClass::outlier, "outlier"},
+                        {PixelClass::no_depth, "outside the picture"}});
   std::string const unit = unit_suffix(result.set.unit);
   for (std::size_t v = 0; v < result.set.views.size() && v < kMostViewsShown; ++v)
     html += view_row(result.set.views[v], unit);
