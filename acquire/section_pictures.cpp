@@ -43,14 +43,17 @@ cv::Mat3b outlined(cv::Mat3b const& color, cv::Mat1b const& classes) {
 
 /// `values` between low and high through a colour map; gray where missing.
 cv::Mat3b colored(cv::Mat1f const& values, double low, double high) {
-  cv::Mat1b scaled(values.size(), static_cast<std::uint8_t>(0));
+  cv::Mat1b scaled(values.size(), static_cast<std::uint8_t>(0)), missing(values.size(), static_cast<std::uint8_t>(0));
   for (int y = 0; y < values.rows; ++y)
-    for (int x = 0; x < values.cols; ++x)
-      if (std::isfinite(values(y, x)))
+    for (int x = 0; x < values.cols; ++x) {
+      // Not `values != values`: OpenCV compares NaN with itself as equal where it uses AVX.
+      missing(y, x) = std::isfinite(values(y, x)) ? 0 : 255;
+      if (missing(y, x) == 0)
         scaled(y, x) = cv::saturate_cast<std::uint8_t>(high > low ? 255 * (values(y, x) - low) / (high - low) : 128);
+    }
   cv::Mat3b picture;
   cv::applyColorMap(scaled, picture, cv::COLORMAP_TURBO);
-  picture.setTo(cv::Scalar::all(40), values != values);
+  picture.setTo(cv::Scalar::all(40), missing);
   return picture;
 }
 

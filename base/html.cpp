@@ -82,7 +82,7 @@ nav a{margin-right:1em}figure{margin:0 .8rem .8rem 0;display:inline-block;vertic
 img{max-width:100%;height:auto;display:block}figcaption{font-size:.8rem;color:#555}
 .row{display:flex;flex-wrap:wrap;align-items:flex-start}.scroll{overflow-x:auto}
 table{border-collapse:collapse;margin:.6rem 0;font-size:.9rem}td,th{padding:.15rem .7rem;border-bottom:1px solid #ddd;text-align:left}
-td.n{text-align:right;font-variant-numeric:tabular-nums}.warning{background:#fff3cd;color:#5c4300;padding:.4rem .8rem;margin:.3rem 0}
+td.n,th.n{text-align:right}td.n{white-space:nowrap;font-variant-numeric:tabular-nums}.warning{background:#fff3cd;color:#5c4300;padding:.4rem .8rem;margin:.3rem 0}
 svg text{fill:currentColor;font:11px system-ui,sans-serif}
 @media(prefers-color-scheme:dark){body{background:#161616;color:#e6e6e6}figcaption{color:#aaa}td,th{border-color:#444}h2{border-color:#444}}
 @media print{figure{break-inside:avoid}nav{display:none}})";
@@ -122,13 +122,21 @@ std::string html_row(std::vector<std::string> const& figures) {
 
 std::string html_table(std::vector<std::vector<std::string>> const& rows) {
   std::string html = "<div class=\"scroll\"><table>\n";
+  std::size_t const columns = rows.empty() ? 0 : rows[0].size();
+  std::vector<char> filled(columns, rows.size() < 2), numbers(columns, 1);
+  for (std::size_t r = 1; r < rows.size(); ++r)
+    for (std::size_t c = 0; c < std::min(columns, rows[r].size()); ++c) {
+      if (rows[r][c].empty()) continue;
+      filled[c] = 1;
+      if (!looks_like_number(rows[r][c])) numbers[c] = 0;
+    }
   for (std::size_t r = 0; r < rows.size(); ++r) {
     html += "<tr>";
-    for (auto const& cell : rows[r]) {
-      if (r == 0)
-        html += "<th>" + html_escape(cell) + "</th>";
-      else
-        html += (looks_like_number(cell) ? "<td class=\"n\">" : "<td>") + html_escape(cell) + "</td>";
+    for (std::size_t c = 0; c < std::min(columns, rows[r].size()); ++c) {
+      if (filled[c] == 0) continue;
+      bool const right = r == 0 ? rows.size() > 1 && numbers[c] != 0 : looks_like_number(rows[r][c]);
+      char const* const tag = r == 0 ? "th" : "td";
+      html += fmt::format("<{}{}>{}</{}>", tag, right ? " class=\"n\"" : "", html_escape(rows[r][c]), tag);
     }
     html += "</tr>\n";
   }

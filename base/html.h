@@ -22,7 +22,8 @@ std::string html_jpeg(cv::Mat const& image, std::string const& caption, int widt
 /// Figures side by side, wrapping.
 std::string html_row(std::vector<std::string> const& figures);
 
-/// A table; cells are text (escaped), the first row of `rows` is the header. Cells that look like numbers align right.
+/// A table; cells are text (escaped), the first row of `rows` is the header. Cells that look like numbers align right,
+/// and so does the title of a column of them. A column with nothing beneath its title is left out.
 std::string html_table(std::vector<std::vector<std::string>> const& rows);
 
 /// A curve of an SVG plot; `points` are (x, y); drawn as a line, or as dots where `dots` is set.

@@ -90,13 +90,16 @@ std::string parameter_table(Calibration const& calibration) {
     if (length) name.append(fmt::format(" ({})", calibration.rig.unit));
     rows.push_back({name, fmt::format("{:.6g}", p.value * unit), fmt::format("{:.2g}", p.std * unit)});
   }
-  for (NamedReason const& held : calibration.held) rows.push_back({held.name, "0", "held: " + held.why});
-  return html_table(rows);
+  std::string html = html_table(rows);
+  if (calibration.held.empty()) return html;
+  rows = {{"held at 0", "why"}};
+  for (NamedReason const& held : calibration.held) rows.push_back({held.name, held.why});
+  return html + html_table(rows);
 }
 
 std::string board_table(Calibration const& calibration) {
   std::vector<std::vector<std::string>> rows = {
-      {"board", "corners left", "corners right", "RMS px", "held out: epipolar px", ""}};
+      {"board", "corners left", "corners right", "RMS px", "held out: epipolar px", "why it is left out"}};
   for (BoardFit const& board : calibration.boards) {
     bool const seen = !board.left.empty() || !board.right.empty();
     rows.push_back({board.name, std::to_string(board.left.size()), std::to_string(board.right.size()),

@@ -42,11 +42,11 @@ std::string length(Json const& value, std::string const& unit) {
 std::string error_phrase(std::string const& stage, Json const& figures, Json const& manifest) {
   std::string const unit = manifest.value("unit", "");
   Json const budget = manifest.value("error_budget", Json::object());
-  auto const part = [&](char const* name) {
-    return length(budget.value(name, Json::object()).value("rms", Json()), unit);
+  auto const part = [&](char const* name, char const* key = "rms") {
+    return length(budget.value(name, Json::object()).value(key, Json()), unit);
   };
   if (stage == "acquire" || stage == "import" || stage == "synth")
-    return "noise of a depth: " + part("sampling") + " RMS";
+    return "noise of a depth: 95 % below " + part("sampling", "p95");  // a few depths of little worth rule an RMS
   if (stage == "register") return "distance between overlapping views: " + part("registration") + " RMS";
   if (stage == "mesh") return "distance from depths to mesh: " + part("approximation") + " RMS";
   if (stage == "evaluate" && figures.contains("renderers")) {
@@ -59,13 +59,14 @@ std::string error_phrase(std::string const& stage, Json const& figures, Json con
 
 std::string introduction(fs::path const& folder) {
   Json const manifest = read_or_empty(folder / "scanset.json"), timings = read_or_empty(folder / "timings.json");
+  std::size_t const views = manifest.value("views", Json::array()).size();
   std::string html = fmt::format(
-      "<p>{} views, unit {}. Each view keeps its own small textured mesh; a picture from any side blends the views "
+      "<p>{} view{}, unit {}. Each view keeps its own small textured mesh; a picture from any side blends the views "
       "around "
       "the eye (view-based rendering, Pulli and others 1997). This page says what every stage did and how good it is: "
       "where the depths come from, how well the views agree, how closely the meshes follow the depths, and how a "
       "picture compares with a photograph that was not used to make it.</p>",
-      manifest.value("views", Json::array()).size(), html_escape(manifest.value("unit", "")));
+      views, views == 1 ? "" : "s", html_escape(manifest.value("unit", "")));
   std::vector<std::vector<std::string>> rows = {{"stage", "seconds", "peak memory, MB", "error"}};
   Json const stages = timings.value("stages", Json::object());
   for (auto const& [stage, title] : kStages) {

@@ -7,10 +7,13 @@
 
 #include "acquire/scan_set_file.h"
 #include "base/error.h"
+#include "base/random.h"
 #include "cli/report.h"
 #include "cli/stages.h"
 #include "mesh/triangle_mesh.h"
 #include "synth/capture_files.h"
+#include "synth/centered_model.h"
+#include "synth/disturbed_pose.h"
 #include "synth/scanner.h"
 
 namespace scanview {
@@ -18,12 +21,12 @@ namespace fs = std::filesystem;
 namespace {
 
 struct Arguments {
-  std::string model, pattern = "sweep", size = "640x480", noise;
+  std::string model, pattern = "sweep", size = "640x480", noise, disturb;
   int views = 12;
   fs::path output;
   bool force = false;
   // range
-  std::string layout = "sphere", disturb;
+  std::string layout = "sphere";
   SynthOptions range;
   // sweep, gray
   std::string beam, projector = "1024x768";
@@ -48,6 +51,16 @@ TriangleMesh load_model(std::string const& model) {
   return read_triangle_mesh(model);
 }
 
+Disturbance disturbance(Arguments const& arguments) {
+  Disturbance result;
+  if (arguments.disturb.empty()) return result;
+  double percent = 0;
+  scan("--disturb", arguments.disturb, "%lf:%lf", "DEGREES:PERCENT", &result.turn_deg, &percent);
+  result.share = percent / 100;
+  result.validate();
+  return result;
+}
+
 SynthOptions range_options(Arguments const& arguments) {
   SynthOptions options = arguments.range;
   options.views = arguments.views;
@@ -55,11 +68,7 @@ SynthOptions range_options(Arguments const& arguments) {
   if (!arguments.noise.empty())
     scan("--noise", arguments.noise, "%lf", "a share of the radius", &options.noise.depth_sigma);
   options.layout = arguments.layout == "circle" ? SynthOptions::Layout::circle : SynthOptions::Layout::sphere;
-  if (!arguments.disturb.empty()) {
-    double percent = 0;
-    scan("--disturb", arguments.disturb, "%lf:%lf", "DEGREES:PERCENT", &options.disturb_deg, &percent);
-    options.disturb_share = percent / 100;
-  }
+  options.disturbance = disturbance(arguments);
   options.validate();
   return options;
 }
@@ -120,8 +129,8 @@ Json to_json(SynthOptions const& options) {
           {"width", options.width},
           {"height", options.height},
           {"distance", options.distance},
-          {"disturb_deg", options.disturb_deg},
-          {"disturb_share", options.disturb_share},
+          {"disturb_deg", options.disturbance.turn_deg},
+          {"disturb_share", options.disturbance.share},
           {"depth_sigma", options.noise.depth_sigma},
           {"color_sigma", options.noise.color_sigma}};
 }
@@ -249,15 +258,33 @@ Json capture_figures(CaptureRig const& rig, TriangleMesh const& model) {
             {"exposure", rig.exposure()}}}};
 }
 
+/// stage/scanset.json: the poses as the stage's dials would tell them, which `register` starts from.
+void write_stage_poses(fs::path const& folder, TriangleMesh const& model, Disturbance const& disturbance,
+                       std::uint64_t seed) {
+  constexpr std::uint64_t kStageItem = 0x7374616765;  // keys the stage's random numbers
+  ScanSet set = read_manifest(folder / "truth");
+  CenteredModel const object = centered(model);
+  for (std::size_t v = 1; v < set.views.size(); ++v) {
+    auto& pose = set.views[v].object_from_camera;
+    pose = disturbed_pose(*pose, object, disturbance, CounterRandom(seed, kStageItem, v));
+  }
+  fs::create_directories(folder / "stage");
+  write_manifest(folder / "stage", set);
+}
+
 void synth_capture(Arguments const& arguments, Session& session) {
   Context& context = session.context;
   CaptureOptions const options = capture_options(arguments);
+  Disturbance const disturb = disturbance(arguments);
   StageRecord record = new_record(arguments, to_json(options), context);
+  record.options["disturb_deg"] = disturb.turn_deg;
+  record.options["disturb_share"] = disturb.share;
   if (is_done(arguments, record, session)) return;
   TriangleMesh const model = load_model(arguments.model);
   NewFolder fresh(arguments.output);
   CaptureRig const rig(model, options, context);
   write_capture(fresh.path(), model, rig, context);
+  if (!arguments.disturb.empty()) write_stage_poses(fresh.path(), model, disturb, context.seed);
   for (char const* file : {"capture.json", "rig.yml", "truth/scanset.json"})
     record.outputs[file] = hash_file(fresh.path() / file);
   record.figures = capture_figures(rig, model);
@@ -310,7 +337,6 @@ void add_range_options(CLI::App& verb, Arguments& arguments) {
   add("--elevation", arguments.range.elevation_deg, "Of a circle, in degrees");
   add("--distance", arguments.range.distance, "Of the eye, in radii of the object");
   add("--color-noise", arguments.range.noise.color_sigma, "Standard deviation of an 8-bit channel");
-  add("--disturb", arguments.disturb, "DEGREES:PERCENT: poses off by so much (percent of the size)");
 }
 
 }  // namespace
@@ -332,6 +358,9 @@ void add_synth(CLI::App& app, Session& session) {
   verb->add_option("--noise", arguments->noise,
                    "sweep, gray: ELECTRONS:READ at full scale and of reading out (10000:10), or none; range: standard "
                    "deviation of a depth, as a share of the radius");
+  verb->add_option("--disturb", arguments->disturb,
+                   "DEGREES:PERCENT: stated poses are off by so much (percent of the size) but for the first view's; "
+                   "sweep, gray: they go to stage/scanset.json");
   add_capture_options(*verb, *arguments);
   add_range_options(*verb, *arguments);
   verb->add_flag("--force", arguments->force, "Also where nothing changed");

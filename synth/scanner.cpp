@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "base/srgb.h"
-#include "synth/centered_model.h"
+#include "synth/disturbed_pose.h"
 #include "synth/ray_scene.h"
 #include "synth/surface_light.h"
 
@@ -60,22 +60,6 @@ Camera make_camera(SynthOptions const& options, CenteredModel const& model, std:
   if (std::isfinite(fit)) f = std::max(f, fit);
   return Camera::perspective(options.width, options.height, f, f, 0.5 * (options.width - 1),
                              0.5 * (options.height - 1));
-}
-
-Vector3d random_unit(CounterRandom& random) {
-  for (;;) {
-    double const x = random.normal(), y = random.normal(), z = random.normal();
-    Vector3d const v(x, y, z);
-    if (v.norm() > 1e-6) return v.normalized();
-  }
-}
-
-Isometry3d disturbed(Isometry3d const& pose, Vector3d const& center, double radius, SynthOptions const& options,
-                     CounterRandom random) {
-  Vector3d const axis = random_unit(random), move = random_unit(random);
-  Eigen::AngleAxisd const turn(options.disturb_deg * std::numbers::pi / 180, axis);
-  return Eigen::Translation3d(center + options.disturb_share * 2 * radius * move) * turn *
-         Eigen::Translation3d(-center) * pose;
 }
 
 /// Casts the rays of one view, in coordinates about the model's centre.
@@ -151,8 +135,7 @@ void SynthOptions::validate() const {
   require(height >= 1 && height <= 16384, "height: must be 1 to 16384");
   require(elevation_deg >= -90 && elevation_deg <= 90, "elevation_deg: must be -90 to 90");
   require(distance > 0 && distance <= 1e4, "distance: must be above 0 and at most 10000 radii");
-  require(disturb_deg >= 0 && disturb_deg <= 180, "disturb_deg: must be 0 to 180");
-  require(disturb_share >= 0 && disturb_share <= 10, "disturb_share: must be 0 to 10");
+  disturbance.validate();
   require(noise.depth_sigma >= 0 && noise.depth_sigma <= 1,
           "noise.depth_sigma: must be 0 to 1 (a share of the radius)");
   require(noise.color_sigma >= 0 && noise.color_sigma <= 255, "noise.color_sigma: must be 0 to 255");
@@ -186,7 +169,7 @@ SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, C
     view.image.color.create(options.height, options.width);
     view.image.classes.setTo(static_cast<int>(PixelClass::background));
     view.object_from_camera =
-        v == 0 ? pose : disturbed(pose, object.center, object.radius, options, CounterRandom(context.seed, v, pixels));
+        v == 0 ? pose : disturbed_pose(pose, object, options.disturbance, CounterRandom(context.seed, v, pixels));
     result.set.views.push_back(std::move(view));
     result.true_depth.emplace_back(options.height, options.width, kMissing);
   }

@@ -5,6 +5,7 @@
 #include "acquire/scan_set.h"
 #include "base/context.h"
 #include "mesh/triangle_mesh.h"
+#include "synth/disturbed_pose.h"
 
 namespace scanview {
 
@@ -19,9 +20,8 @@ struct SynthOptions {
   enum class Layout { sphere, circle } layout = Layout::sphere;
   double elevation_deg = 25;  ///< of a circle, -90 to 90; its first eye is in front (+z), the next ones towards +x
   int width = 640, height = 480;
-  double distance = 4;       ///< of the eye from the centre, in radii of the object; below 1 it may be inside
-  double disturb_deg = 0;    ///< every pose but the first is turned by so much about a random axis through the centre
-  double disturb_share = 0;  ///< and moved by this share of the object's size (2 radii) in a random direction
+  double distance = 4;      ///< of the eye from the centre, in radii of the object; below 1 it may be inside
+  Disturbance disturbance;  ///< of every pose but the first
   SynthNoise noise;
   /// Throws Error{usage} naming the field and its range.
   void validate() const;

@@ -7,6 +7,19 @@
 namespace scanview {
 namespace {
 
+TEST(HtmlTable, LeavesOutColumnsWithNothingBeneathTheirTitle) {
+  std::string const html = html_table({{"view", "rows", "why"}, {"a", "", "dark"}, {"b", "", ""}});
+  EXPECT_EQ(html.find("rows"), std::string::npos);
+  EXPECT_NE(html.find("<td>dark</td>"), std::string::npos);
+  EXPECT_NE(html_table({{"view", "rows"}}).find("rows"), std::string::npos);  // no rows at all: the titles stay
+}
+
+TEST(HtmlTable, AlignsTitlesWithTheirNumbers) {
+  std::string const html = html_table({{"sigma", "mixed"}, {"0.5", "1"}, {"", "none"}});
+  EXPECT_NE(html.find("<th class=\"n\">sigma</th>"), std::string::npos);
+  EXPECT_NE(html.find("<th>mixed</th>"), std::string::npos);
+}
+
 TEST(Html, TextIsEscaped) { EXPECT_EQ(html_escape("<a & \"b\">"), "&lt;a &amp; &quot;b&quot;&gt;"); }
 
 TEST(Html, PicturesAreEmbedded) {

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <numbers>
+
+#include "acquire/scan_set_file.h"
 #include "tests/cli/command.h"
 
 namespace scanview {
@@ -33,6 +37,18 @@ TEST_F(Synth, ACaptureIsTheSameForAnyNumberOfThreadsAndIsNotMadeTwice) {
   EXPECT_EQ(fs::last_write_time(in("one") + "/capture.json"), before);
   run(tiny("one", {"--seed", "2"}));
   EXPECT_NE(folder_hashes(in("one")), folder_hashes(in("two")));
+}
+
+TEST_F(Synth, StatedPosesAreOffByWhatWasAskedForButTheFirst) {
+  run(tiny("off", {"--disturb", "2:1"}));
+  ScanSet const truth = read_manifest(in("off") + "/truth"), stated = read_manifest(in("off") + "/stage");
+  Eigen::Isometry3d const first = truth.views[0].object_from_camera->inverse() * *stated.views[0].object_from_camera;
+  Eigen::Isometry3d const second = truth.views[1].object_from_camera->inverse() * *stated.views[1].object_from_camera;
+  // Numbers are written with all their digits; an angle's cosine keeps half of them.
+  EXPECT_LT((first.matrix() - Eigen::Matrix4d::Identity()).norm(), 1e-9);
+  EXPECT_NEAR(Eigen::AngleAxisd(second.linear()).angle() * 180 / std::numbers::pi, 2, 1e-6);
+  run(tiny("exact"));
+  EXPECT_FALSE(fs::exists(in("exact") + "/stage"));
 }
 
 TEST_F(Synth, GrayCodeHasItsOwnManifest) {

@@ -183,8 +183,8 @@ TEST(Scanner, WithoutNoiseDepthIsTheTruthAndSigmaStaysAboveZero) {
 
 TEST(Scanner, DisturbedPosesAreOffByExactlyWhatWasAsked) {
   SynthOptions options = small(6);
-  options.disturb_deg = 3;
-  options.disturb_share = 0.02;
+  options.disturbance.turn_deg = 3;
+  options.disturbance.share = 0.02;
   Context context;
   SynthResult const result = synthesize(make_icosphere({5, 6, 7}, 40, 2), options, context);
   Vector3d const center = result.set.center;
@@ -206,7 +206,7 @@ TEST(Scanner, SameSeedSameBytesForAnyNumberOfThreads) {
     mesh.colors.emplace_back(cv::saturate_cast<uchar>(3 * v.x()), 128, cv::saturate_cast<uchar>(-3 * v.y()));
   SynthOptions options = small(3);
   options.noise = {0.001, 2};
-  options.disturb_deg = 1;
+  options.disturbance.turn_deg = 1;
   Context one, four, other_seed;
   one.threads = 1;
   four.threads = 4;
@@ -335,8 +335,8 @@ TEST(Scanner, BadOptionsAreNamed) {
   refused([](auto& o) { o.elevation_deg = 91; }, "elevation_deg");
   refused([](auto& o) { o.distance = 0; }, "distance");
   refused([](auto& o) { o.distance = NAN; }, "distance");
-  refused([](auto& o) { o.disturb_deg = -1; }, "disturb_deg");
-  refused([](auto& o) { o.disturb_share = INFINITY; }, "disturb_share");
+  refused([](auto& o) { o.disturbance.turn_deg = -1; }, "disturbance.turn_deg");
+  refused([](auto& o) { o.disturbance.share = INFINITY; }, "disturbance.share");
   refused([](auto& o) { o.noise.depth_sigma = -0.1; }, "noise.depth_sigma");
   refused([](auto& o) { o.noise.color_sigma = NAN; }, "noise.color_sigma");
 }
