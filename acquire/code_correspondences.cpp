@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
 
 namespace scanview {
 namespace {
@@ -11,7 +10,9 @@ namespace {
 constexpr int kLeastPixels = 2;
 constexpr double kWidest = 3;  // standard deviation of a cell's pixels, in pixels: beyond, it is seen in two places
 
+/// The pixels of one cell of the projector.
 struct Cell {
+  std::uint32_t key = 0;  ///< column and row
   double x = 0, y = 0, square = 0;
   int count = 0;
 
@@ -19,19 +20,34 @@ struct Cell {
   bool is_good() const { return count >= kLeastPixels && square / count - middle().squaredNorm() <= kWidest * kWidest; }
 };
 
-using Cells = std::unordered_map<std::uint32_t, Cell>;
-
-Cells cells_of(DecodedSide const& side) {
-  Cells cells;
+/// Good cells, by key. Sorted pixels in place of a map: a tenth of the time.
+std::vector<Cell> cells_of(DecodedSide const& side) {
+  std::vector<std::uint64_t> pixels;  // key, y, x
   for (int y = 0; y < side.rows.rows; ++y)
     for (int x = 0; x < side.rows.cols; ++x) {
       if (side.rows(y, x) < 0 || !side.image.has_code(x, y)) continue;
-      auto const column = static_cast<std::uint32_t>(std::max(side.image.code(y, x), 0.0F));
-      Cell& cell = cells[column << 16 | static_cast<std::uint32_t>(side.rows(y, x))];
-      cell.x += x, cell.y += y;
-      cell.square += static_cast<double>(x) * x + static_cast<double>(y) * y;
-      ++cell.count;
+      auto const column = static_cast<std::uint64_t>(std::max(side.image.code(y, x), 0.0F));
+      pixels.push_back(column << 48 | static_cast<std::uint64_t>(side.rows(y, x)) << 32 |
+                       static_cast<std::uint64_t>(y) << 16 | static_cast<std::uint64_t>(x));
     }
+  std::sort(pixels.begin(), pixels.end());
+  std::vector<Cell> cells;
+  Cell cell;
+  auto const finish = [&] {
+    if (cell.is_good()) cells.push_back(cell);
+  };
+  for (std::uint64_t const pixel : pixels) {
+    auto const key = static_cast<std::uint32_t>(pixel >> 32);
+    if (key != cell.key) {
+      finish();
+      cell = {key};
+    }
+    auto const x = static_cast<double>(pixel & 0xffff), y = static_cast<double>(pixel >> 16 & 0xffff);
+    cell.x += x, cell.y += y;
+    cell.square += x * x + y * y;
+    ++cell.count;
+  }
+  finish();
   return cells;
 }
 
@@ -39,16 +55,13 @@ Cells cells_of(DecodedSide const& side) {
 
 std::vector<Correspondence> code_correspondences(DecodedSide const& left, DecodedSide const& right) {
   if (left.rows.empty() || right.rows.empty()) return {};
-  Cells const in_left = cells_of(left), in_right = cells_of(right);
-  std::vector<std::uint32_t> keys;
-  for (auto const& [key, cell] : in_left)
-    if (auto const other = in_right.find(key); cell.is_good() && other != in_right.end() && other->second.is_good())
-      keys.push_back(key);
-  std::sort(keys.begin(), keys.end());  // a hash map has no order of its own
+  std::vector<Cell> const in_left = cells_of(left), in_right = cells_of(right);
   std::vector<Correspondence> matches;
-  for (std::uint32_t const key : keys) {
-    Cell const &a = in_left.at(key), &b = in_right.at(key);
-    matches.push_back({a.middle(), b.middle(), 0.3F});
+  auto other = in_right.begin();
+  for (Cell const& cell : in_left) {
+    while (other != in_right.end() && other->key < cell.key) ++other;
+    if (other == in_right.end()) break;
+    if (other->key == cell.key) matches.push_back({cell.middle(), other->middle(), 0.3F});
   }
   return matches;
 }
