@@ -171,8 +171,8 @@ class Acquisition {
           "the line between the cameras, by 90°)");
     if (!left.centres.empty()) keep_centres(ideal, left.centres, geometry.left_map);
     MatchFigures match;
-    RangeImage image =
-        match_codes(ideal, left_rows, right_rows, geometry.rectification, geometry.rig.left.camera, match, context_);
+    RangeImage image = match_codes(ideal, left_rows, right_rows, geometry.rectification, geometry.rig.left.camera,
+                                   left.centres.empty() ? CodeDensity::surfaces : CodeDensity::lines, match, context_);
     figures.decodable = match.decodable;
     figures.ambiguous = match.ambiguous;
     figures.sheet_scatter = match.sheet_scatter;

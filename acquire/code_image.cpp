@@ -98,6 +98,10 @@ CodeLinks link_codes(CodeImage const& image) {
 void judge_mixed(CodeImage& image, CodeLinks& links, double share) {
   int const rows = image.code.rows, cols = image.code.cols;
   cv::Mat1b drop(rows, cols, std::uint8_t{0});
+  // What is left is known no better than paint is even. Of a pixel that a surface covers from a part to the whole, all
+  // alike likely, the covered part's middle is off by (1 - part) / 2 / sqrt(3), RMS. Where less than half is covered
+  // the pixel's centre is another surface's.
+  float const least_shift = 0.5F * (1 - std::min(static_cast<float>(share), 0.5F)) / std::sqrt(3.0F);
   for (int y = 2; y + 2 < rows; ++y)
     for (int x = 2; x + 2 < cols; ++x) {
       if (!image.has_code(x, y)) continue;
@@ -118,7 +122,7 @@ void judge_mixed(CodeImage& image, CodeLinks& links, double share) {
         float const left = expected > 0 ? std::min(here / expected, 1.0F) : 1;
         least = std::min(least, left);
         float const slope = std::abs(image.code(y, x) - image.code(y + sign * dy, x + sign * dx));
-        return 0.5F * (1 - left) * std::max(slope, static_cast<float>(links.slope));
+        return std::max(0.5F * (1 - left), least_shift) * std::max(slope, static_cast<float>(links.slope));
       };
       float const along = shift(links.across(y, x - 1) != 0, links.across(y, x) != 0, 1, 0);
       float const down = shift(links.down(y - 1, x) != 0, links.down(y, x) != 0, 0, 1);

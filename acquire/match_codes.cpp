@@ -20,7 +20,8 @@ constexpr float kSelf = 1.5F;                // pixels: a partner's partner with
 constexpr float kNear = 2;                   // pixels of disparity from what the surroundings agree on
 constexpr int kAround = 3;                   // pixels each way: the surroundings
 constexpr int kLeastAround = 5;              // of them with one partner
-constexpr int kSupport = 2;                  // of eight neighbours
+constexpr int kSupport = 3;                  // of eight neighbours; at an edge five are of the same surface,
+constexpr int kThinSupport = 2;              // along a stripe two
 constexpr float kOneRow = 0.25F;             // pixels a row that a line of light may lean, where only one row has it
 constexpr float kShared = 0.25F;             // correlation of neighbours after bilinear resampling (mean over phases)
 constexpr double kMostLeap = 40;             // median changes of the code from pixel to pixel
@@ -209,8 +210,10 @@ namespace {
 /// The work of match_codes, row by row.
 class Matcher {
  public:
-  Matcher(CodeImage const& left, CodeRows const& right_rows, Rectification const& rectification, Camera const& camera)
+  Matcher(CodeImage const& left, CodeRows const& right_rows, Rectification const& rectification, Camera const& camera,
+          CodeDensity density)
       : left_(left),
+        least_support_(density == CodeDensity::lines ? kThinSupport : kSupport),
         right_rows_(right_rows),
         rectification_(rectification),
         camera_(camera),
@@ -301,7 +304,7 @@ class Matcher {
         if ((dx == 0 && dy == 0) || u < 0 || v < 0 || u >= disparity_.cols || v >= disparity_.rows) continue;
         support += std::abs(disparity_(v, u) - disparity_(y, x)) <= kNear + 4 * sigma_(y, x);
       }
-    return support >= kSupport;
+    return support >= least_support_;
   }
 
   /// Depth from disparity; a pixel without support has none.
@@ -382,6 +385,7 @@ class Matcher {
   void set_class(int x, int y, PixelClass what) { image_.classes(y, x) = static_cast<std::uint8_t>(what); }
 
   CodeImage const& left_;
+  int least_support_;
   CodeRows const& right_rows_;
   Rectification const& rectification_;
   Camera const& camera_;
@@ -409,8 +413,8 @@ std::vector<LightSheets::Match> sample_matches(Matcher const& matcher, CodeRows 
 
 RangeImage match_codes(CodeImage const& left, std::function<CodeRows(int step)> const& left_rows,
                        CodeRows const& right_rows, Rectification const& rectification, Camera const& camera,
-                       MatchFigures& figures, Context& context) {
-  Matcher matcher(left, right_rows, rectification, camera);
+                       CodeDensity density, MatchFigures& figures, Context& context) {
+  Matcher matcher(left, right_rows, rectification, camera, density);
   auto const bands = static_cast<std::size_t>((camera.height() + kBandRows - 1) / kBandRows);
   auto const for_each_row = [&](auto const& work) {
     for_each_index(context, bands, [&](std::size_t band) {

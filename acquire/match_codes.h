@@ -64,6 +64,9 @@ class CodeRows {
   double change_along_rows_ = 0;
 };
 
+/// Whether most pixels of a surface have a code, or only those on lines a pixel wide (the stripe decoder).
+enum class CodeDensity { surfaces, lines };
+
 struct MatchFigures {
   std::size_t decodable = 0;  ///< left pixels with a code
   std::size_t ambiguous = 0;  ///< of them with several partners that may be right
@@ -74,8 +77,8 @@ struct MatchFigures {
 /// several partners the one counts whose place agrees with the sheet of light that the view's unambiguous matches tell
 /// of (light_sheets.h); a partner that does not agree is none. Where the light's geometry cannot be told, a partner
 /// counts whose own partner on the left is this pixel alone, or, where there are rivals, one whose disparity is within
-/// `kNear` pixels of what the surroundings agree on; else the pixel is inconsistent. Depths that fewer than two of the
-/// eight neighbours support go, too.
+/// `kNear` pixels of what the surroundings agree on; else the pixel is inconsistent. Depths that fewer than three of
+/// the eight neighbours support (two where codes are lines) go, too.
 ///
 /// `left` are the codes on the grid of the ideal left camera (see resample), `right_rows` on the right rectified one;
 /// `left_rows(step)` makes every so many rows of the left rectified one: every third tells where the light was, and all
@@ -83,6 +86,6 @@ struct MatchFigures {
 /// / |d code / dx|, Z the depth in the rectified frame.
 RangeImage match_codes(CodeImage const& left, std::function<CodeRows(int step)> const& left_rows,
                        CodeRows const& right_rows, Rectification const& rectification, Camera const& camera,
-                       MatchFigures& figures, Context& context);
+                       CodeDensity density, MatchFigures& figures, Context& context);
 
 }  // namespace scanview
