@@ -224,18 +224,9 @@ class Acquisition {
   void measure_shift(RangeImage const& image, Sides const& sides, Geometry const& geometry, AcquiredView& figures) {
     Rectification const& r = geometry.rectification;
     cv::Mat1b left, right;
-    auto const whole = [](PictureMap const& map) {
-      cv::Mat2f all(map.size());
-      std::vector<cv::Vec2f> row;
-      for (int y = 0; y < all.rows; ++y) {
-        map.row(y, row);
-        std::copy(row.begin(), row.end(), all[y]);
-      }
-      return all;
-    };
-    cv::remap(sides[0].image.lit, left, whole(geometry.left_row_map), cv::noArray(), cv::INTER_LINEAR,
+    cv::remap(sides[0].image.lit, left, geometry.left_row_map.whole(), cv::noArray(), cv::INTER_LINEAR,
               cv::BORDER_CONSTANT);
-    cv::remap(sides[1].image.lit, right, whole(geometry.right_row_map), cv::noArray(), cv::INTER_LINEAR,
+    cv::remap(sides[1].image.lit, right, geometry.right_row_map.whole(), cv::noArray(), cv::INTER_LINEAR,
               cv::BORDER_CONSTANT);
     cv::Mat1f x_right(left.size(), kMissing);
     for (int y = 0; y < image.depth.rows; ++y)
