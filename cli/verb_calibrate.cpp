@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct CalibrateArguments {
   std::vector<std::string> left, right;
   std::string board, dictionary, layout = "auto";
   double square = 0, marker = 0;
@@ -24,7 +24,7 @@ struct Arguments {
   CalibrateOptions options;
 };
 
-BoardDescription describe(Arguments const& arguments) {
+BoardDescription describe(CalibrateArguments const& arguments) {
   BoardDescription board = parse_board(arguments.board, arguments.square, arguments.marker, arguments.dictionary);
   if (arguments.layout == "old") board.layout = BoardDescription::Layout::old;
   if (arguments.layout == "current") board.layout = BoardDescription::Layout::current;
@@ -61,7 +61,7 @@ void explain_missing(Calibration& calibration, BoardPictures const& pictures) {
   }
 }
 
-void run(Arguments const& arguments, Session& session) {
+void run(CalibrateArguments const& arguments, Session& session) {
   Context& context = session.context;
   BoardDescription const board = describe(arguments);
   CalibrateOptions options = arguments.options;
@@ -122,7 +122,7 @@ void run(Arguments const& arguments, Session& session) {
 }  // namespace
 
 void add_calibrate(CLI::App& app, Session& session) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateArguments>();
   CLI::App* verb = app.add_subcommand("calibrate", "Pictures of a board become a calibrated stereo rig");
   verb->add_option("--left", arguments->left, "Left pictures: pattern, folder or files")->required();
   verb->add_option("--right", arguments->right, "Right pictures; without them the left camera is calibrated alone");

@@ -17,7 +17,7 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   fs::path set, output, path;
   int orbit = 0;
   bool halfway = false;
@@ -35,7 +35,7 @@ std::pair<int, int> parse_size(std::string const& text) {
   return {width, height};
 }
 
-std::vector<PathCamera> cameras(Arguments const& arguments, ScanSet const& set) {
+std::vector<PathCamera> cameras(RenderArguments const& arguments, ScanSet const& set) {
   auto const [width, height] = parse_size(arguments.size);
   if (arguments.orbit > 0) return orbit_path(set, arguments.orbit, width, height);
   if (arguments.halfway) return halfway_path(set, width, height);
@@ -43,7 +43,7 @@ std::vector<PathCamera> cameras(Arguments const& arguments, ScanSet const& set) 
   return {camera_like(set, arguments.like, width, height)};
 }
 
-void render(Arguments const& arguments, Session& session) {
+void render(RenderArguments const& arguments, Session& session) {
   Context& context = session.context;
   ScanSet const set = read_scan_set(arguments.set, context);
   auto const path = cameras(arguments, set);
@@ -76,7 +76,7 @@ void render(Arguments const& arguments, Session& session) {
 }  // namespace
 
 void add_render(CLI::App& app, Session& session) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RenderArguments>();
   CLI::App* verb =
       app.add_subcommand("render", "Pictures (PNG with alpha) and depths (EXR) from any side; needs no display");
   verb->add_option("set", arguments->set, "The scan set, meshed")->required();

@@ -18,7 +18,7 @@ namespace {
 constexpr std::array kVerbs = {"import", "register", "mesh", "render", "evaluate"};
 constexpr std::size_t kViews = 0;  // of a capture, `acquire` takes the place of `import`
 
-struct Arguments {
+struct RunArguments {
   fs::path input, output;
   std::string kind, from, to, hold_out = "one";
   bool force = false, dry_run = false;
@@ -39,7 +39,7 @@ std::size_t verb_index(std::string const& name, std::size_t otherwise) {
 bool is_scan_set(fs::path const& path) { return fs::exists(path / "scanset.json"); }
 
 /// What is in place of an import's box, ground and frames: only depth range and background mean something to a capture.
-AcquireRequest acquire_request(Arguments const& arguments, std::vector<std::string> const& settings) {
+AcquireRequest acquire_request(RunArguments const& arguments, std::vector<std::string> const& settings) {
   ImportOptions const import = resolve(arguments.import_flags);
   if (import.box || import.cut_ground || import.step != 1)
     throw Error(ErrorCode::usage, {}, "--box, --cut-ground and --step are no options of a capture");
@@ -52,7 +52,7 @@ AcquireRequest acquire_request(Arguments const& arguments, std::vector<std::stri
 
 class Pipeline {
  public:
-  Pipeline(Arguments const& arguments, Session& session)
+  Pipeline(RunArguments const& arguments, Session& session)
       : arguments_(arguments),
         session_(session),
         register_request_(resolve(arguments.register_flags, session.settings)),
@@ -120,7 +120,7 @@ class Pipeline {
   }
 
  private:
-  Arguments const& arguments_;
+  RunArguments const& arguments_;
   Session& session_;
   fs::path folder_;
   bool in_place_ = false;
@@ -133,7 +133,7 @@ class Pipeline {
 }  // namespace
 
 void add_run(CLI::App& app, Session& session) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RunArguments>();
   CLI::App* verb = app.add_subcommand("run", "Every stage in order, from a capture or frames to pictures and a report");
   verb->add_option("input", arguments->input, "A capture, colour and depth frames, scans, or a scan set")->required();
   verb->add_option("-o,--output", arguments->output, "The scan set to make (a set alone is worked on in place)");

@@ -20,7 +20,7 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
-struct Arguments {
+struct SynthArguments {
   std::string model, pattern = "sweep", size = "640x480", noise, disturb;
   int views = 12;
   fs::path output;
@@ -51,7 +51,7 @@ TriangleMesh load_model(std::string const& model) {
   return read_triangle_mesh(model);
 }
 
-Disturbance disturbance(Arguments const& arguments) {
+Disturbance disturbance(SynthArguments const& arguments) {
   Disturbance result;
   if (arguments.disturb.empty()) return result;
   double percent = 0;
@@ -61,7 +61,7 @@ Disturbance disturbance(Arguments const& arguments) {
   return result;
 }
 
-SynthOptions range_options(Arguments const& arguments) {
+SynthOptions range_options(SynthArguments const& arguments) {
   SynthOptions options = arguments.range;
   options.views = arguments.views;
   scan("--size", arguments.size, "%dx%d", "WIDTHxHEIGHT", &options.width, &options.height);
@@ -99,7 +99,7 @@ void apply_fault(std::string const& text, CaptureFaults& faults) {
   }
 }
 
-CaptureOptions capture_options(Arguments const& arguments) {
+CaptureOptions capture_options(SynthArguments const& arguments) {
   CaptureOptions options = arguments.capture;
   options.views = arguments.views;
   scan("--size", arguments.size, "%dx%d", "WIDTHxHEIGHT", &options.width, &options.height);
@@ -191,13 +191,13 @@ void require_own(fs::path const& folder) {
 }
 
 /// True where the folder already holds what is asked for; its figures are then reported.
-bool is_done(Arguments const& arguments, StageRecord const& record, Session& session) {
+bool is_done(SynthArguments const& arguments, StageRecord const& record, Session& session) {
   if (arguments.force || !is_up_to_date(arguments.output, record)) return false;
   session.report.update(read_stage_record(arguments.output, "synth").figures);
   return true;
 }
 
-StageRecord new_record(Arguments const& arguments, Json options, Context const& context) {
+StageRecord new_record(SynthArguments const& arguments, Json options, Context const& context) {
   StageRecord record{"synth", std::move(options), Json::object(), Json::object(), Json::object()};
   record.options["seed"] = context.seed;
   bool const is_file = fs::is_regular_file(arguments.model);
@@ -205,7 +205,7 @@ StageRecord new_record(Arguments const& arguments, Json options, Context const& 
   return record;
 }
 
-void synth_range(Arguments const& arguments, Session& session) {
+void synth_range(SynthArguments const& arguments, Session& session) {
   Context& context = session.context;
   SynthOptions const options = range_options(arguments);
   StageRecord record = new_record(arguments, to_json(options), context);
@@ -272,7 +272,7 @@ void write_stage_poses(fs::path const& folder, TriangleMesh const& model, Distur
   write_manifest(folder / "stage", set);
 }
 
-void synth_capture(Arguments const& arguments, Session& session) {
+void synth_capture(SynthArguments const& arguments, Session& session) {
   Context& context = session.context;
   CaptureOptions const options = capture_options(arguments);
   Disturbance const disturb = disturbance(arguments);
@@ -293,7 +293,7 @@ void synth_capture(Arguments const& arguments, Session& session) {
   session.report.update(record.figures);
 }
 
-void synth(Arguments const& arguments, Session& session) {
+void synth(SynthArguments const& arguments, Session& session) {
   require_own(arguments.output);
   if (arguments.pattern == "range")
     synth_range(arguments, session);
@@ -301,7 +301,7 @@ void synth(Arguments const& arguments, Session& session) {
     synth_capture(arguments, session);
 }
 
-void add_capture_options(CLI::App& verb, Arguments& arguments) {
+void add_capture_options(CLI::App& verb, SynthArguments& arguments) {
   std::string const group = "sweep, gray";
   CaptureOptions& options = arguments.capture;
   auto const add = [&](char const* name, auto& value, char const* what) {
@@ -329,7 +329,7 @@ void add_capture_options(CLI::App& verb, Arguments& arguments) {
       "jitter:STEPS, moved:DEGREES");
 }
 
-void add_range_options(CLI::App& verb, Arguments& arguments) {
+void add_range_options(CLI::App& verb, SynthArguments& arguments) {
   auto const add = [&](char const* name, auto& value, char const* what) {
     return verb.add_option(name, value, what)->group("range");
   };
@@ -342,7 +342,7 @@ void add_range_options(CLI::App& verb, Arguments& arguments) {
 }  // namespace
 
 void add_synth(CLI::App& app, Session& session) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SynthArguments>();
   CLI::App* verb = app.add_subcommand(
       "synth", "Captures a model: what two cameras see of a swept light, and the exact truth beside it");
   std::string names;

@@ -40,6 +40,20 @@ TEST(Architecture, FoldersIncludeOnlyWhatStandsBeforeThem) {
     }
 }
 
+// So that compiling the source tells whether the header includes all it needs.
+TEST(Architecture, SourcesIncludeTheirOwnHeaderFirst) {
+  std::regex const include("#include (\\S+)");
+  for (auto const& [folder, allowed] : kMayInclude)
+    for (auto const& entry : fs::recursive_directory_iterator(fs::path(SCANVIEW_SOURCE_DIR) / folder)) {
+      fs::path header = entry.path();
+      if (header.extension() != ".cpp" || !fs::exists(header.replace_extension(".h"))) continue;
+      std::string const text = read_file(entry.path());
+      std::smatch first;
+      ASSERT_TRUE(std::regex_search(text, first, include)) << entry.path();
+      EXPECT_EQ(first[1], '"' + header.lexically_relative(SCANVIEW_SOURCE_DIR).string() + '"') << entry.path();
+    }
+}
+
 TEST(Architecture, PublicHeadersKeepHeavyLibrariesOut) {
   for (auto const& [folder, allowed] : kMayInclude)
     for (auto const& entry : fs::recursive_directory_iterator(fs::path(SCANVIEW_SOURCE_DIR) / folder)) {
