@@ -10,17 +10,6 @@ namespace {
 
 constexpr int kNoiseRows = 8;  // every so many rows are sampled
 
-/// pattern - inverse of a row, halved where pictures have 16 bits.
-void difference(cv::Mat const& pattern, cv::Mat const& inverse, int y, std::int16_t* d) {
-  if (pattern.depth() == CV_8U) {
-    auto const *const a = pattern.ptr<std::uint8_t>(y), *const b = inverse.ptr<std::uint8_t>(y);
-    for (int x = 0; x < pattern.cols; ++x) d[x] = static_cast<std::int16_t>(a[x] - b[x]);
-  } else {
-    auto const *const a = pattern.ptr<std::uint16_t>(y), *const b = inverse.ptr<std::uint16_t>(y);
-    for (int x = 0; x < pattern.cols; ++x) d[x] = static_cast<std::int16_t>((a[x] >> 1) - (b[x] >> 1));
-  }
-}
-
 }  // namespace
 
 GrayDecoder::GrayDecoder(Capture const& capture) : capture_(capture) {}
@@ -45,12 +34,7 @@ void GrayDecoder::add(GrayFrame const& what, cv::Mat const& picture) {
 void GrayDecoder::add_pair(GrayFrame const& what, cv::Mat const& pattern, cv::Mat const& inverse) {
   is_16_bit_ = pattern.depth() == CV_16U;
   GrayBits& bits = what.is_row ? rows_ : columns_;
-  if (bits.word.empty()) bits.create(pattern.size());
-  std::vector<std::int16_t> d(static_cast<std::size_t>(pattern.cols));
-  for (int y = 0; y < pattern.rows; ++y) {
-    difference(pattern, inverse, y, d.data());
-    bits.add_row(what.bit, y, d.data());
-  }
+  bits.add(what.bit, pattern, inverse);
   // The coarsest bit's, whatever the order: where d passes zero the greater is half as bright, and fine stripes have
   // many such places.
   if (level_.empty() || (!what.is_row && what.bit > level_bit_)) {
@@ -83,17 +67,12 @@ void GrayDecoder::sample_noise(cv::Mat const& pattern, cv::Mat const& inverse) {
   last_sum_ = sum;
 }
 
-/// Standard deviation of d = a - b at each pixel: var(a) + var(b) = 2 var((a + b) / 2).
-cv::Mat1f GrayDecoder::noise_of_differences() const {
-  cv::Mat1f noise(level_.size());
-  double const halved = is_16_bit_ ? 0.5 : 1;
-  std::vector<float> table(is_16_bit_ ? 65536 : 256);
-  for (std::size_t level = 0; level < table.size(); ++level)
-    table[level] = static_cast<float>(halved * std::sqrt(2 * noise_.variance(static_cast<double>(level))));
-  for (int y = 0; y < noise.rows; ++y)
-    for (int x = 0; x < noise.cols; ++x)
-      noise(y, x) = table[is_16_bit_ ? level_.at<std::uint16_t>(y, x) : level_.at<std::uint8_t>(y, x)];
-  return noise;
+/// Standard deviation of d = a - b at each level of (a + b) / 2: var(a) + var(b) = 2 var((a + b) / 2).
+std::vector<float> GrayDecoder::noise_of_differences() const {
+  std::vector<float> of_level(is_16_bit_ ? 65536 : 256);
+  for (std::size_t level = 0; level < of_level.size(); ++level)
+    of_level[level] = static_cast<float>(std::sqrt(2 * noise_.variance(static_cast<double>(level))));
+  return of_level;
 }
 
 CodeImage GrayDecoder::finish() {
@@ -105,13 +84,16 @@ CodeImage GrayDecoder::finish() {
   if (fit_) noise_ = fit_->solve();
   fit_.reset();
   last_sum_.release();
-  cv::Mat1f const noise = noise_of_differences();
+  DifferenceNoise const noise = {level_, noise_of_differences()};
   CodeImage image = border_codes(columns_, noise, capture_.projector_columns);
   if (!rows_.word.empty()) row_codes_ = whole_codes(rows_, noise, capture_.projector_rows);
   cv::Mat const brightest = white_.empty() ? brightest_ : white_;
   int const full = is_16_bit_ ? 65535 : 255;
-  image.classes.setTo(static_cast<int>(PixelClass::saturated),
-                      (brightest >= full) & (image.classes != static_cast<int>(PixelClass::object)));
+  for (int y = 0; y < image.classes.rows; ++y)
+    for (int x = 0; x < image.classes.cols; ++x) {
+      int const level = is_16_bit_ ? brightest.at<std::uint16_t>(y, x) : brightest.at<std::uint8_t>(y, x);
+      if (level == full && !image.has_code(x, y)) image.classes(y, x) = static_cast<int>(PixelClass::saturated);
+    }
   brightest.convertTo(image.lit, CV_8U, is_16_bit_ ? 1.0 / 257 : 1);
   return image;
 }

@@ -29,7 +29,7 @@ class GrayDecoder {
   };
   void add_pair(GrayFrame const& what, cv::Mat const& pattern, cv::Mat const& inverse);
   void sample_noise(cv::Mat const& pattern, cv::Mat const& inverse);
-  cv::Mat1f noise_of_differences() const;
+  std::vector<float> noise_of_differences() const;
 
   Capture const& capture_;
   cv::Mat white_, black_;

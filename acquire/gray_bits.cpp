@@ -15,9 +15,8 @@ constexpr float kLightSigmas = 8;      // the least contrast of a pixel that the
 constexpr float kLeastLevels = 4;      // and in levels: quantisation is no noise
 constexpr int kWidestColumn = 24;      // pixels; borders farther apart are not interpolated
 constexpr int kMostBorders = 4;        // between two neighbouring pixels of one surface
+constexpr int kScatterRows = 8;        // every so many rows tell of the whole picture
 constexpr float kUniform = 0.288675F;  // standard deviation of a uniform distribution of width 1
-
-std::int16_t size_of(std::int16_t d) { return static_cast<std::int16_t>(d < 0 ? -d : d); }
 
 int binary_from_gray(unsigned word) {
   for (unsigned shift = 8; shift > 0; shift >>= 1) word ^= word >> shift;
@@ -36,27 +35,37 @@ struct Border {
   bool follows = false;  // the border before it is the other one of the same column
 };
 
-/// One line of pixels through the bits.
+/// One line of pixels through the bits; T is a size's type.
+template <class T>
 class Line {
  public:
-  Line(GrayBits const& bits, cv::Mat1i const& codes, cv::Mat1f const& noise, int y)
-      : word_(bits.word[y]),
-        finest_(bits.finest[y]),
-        weakest_(bits.weakest[y]),
-        weakest_bit_(bits.weakest_bit[y]),
-        largest_(bits.largest[y]),
-        code_(codes[y]),
-        noise_(noise[y]),
-        length_(codes.cols) {}
+  Line(GrayBits const& bits, DifferenceNoise const& noise, std::optional<int> count)
+      : bits_(bits), of_level_(noise.of_level), levels_(noise.level), count_(count.value_or(1 << 16)) {
+    code_.resize(static_cast<std::size_t>(bits.word.cols));
+    noise_.resize(code_.size());
+  }
+
+  void read(int y) {
+    word_ = bits_.word[y];
+    weakest_bit_ = bits_.weakest_bit[y];
+    finest_ = bits_.finest.ptr<T>(y), weakest_ = bits_.weakest.ptr<T>(y), second_ = bits_.second.ptr<T>(y);
+    largest_ = bits_.largest.ptr<T>(y);
+    T const* const level = levels_.ptr<T>(y);
+    for (std::size_t x = 0; x < code_.size(); ++x) noise_[x] = of_level_[level[x]];
+    for (std::size_t x = 0; x < code_.size(); ++x) code_[x] = whole_code(x);
+  }
+
+  /// See whole_codes.
+  std::vector<int> const& codes() const { return code_; }
 
   /// All borders, from left to right.
   void find_borders(std::vector<Border>& borders) const {
     borders.clear();
-    for (int x = 0; x + 1 < length_; ++x) {
+    for (std::size_t x = 0; x + 1 < code_.size(); ++x) {
       int const a = code_[x], b = code_[x + 1];
       if (a < 0 || b < 0 || a == b || std::abs(b - a) > kMostBorders) continue;
       int const direction = b > a ? 1 : -1;
-      float least = static_cast<float>(x);
+      auto least = static_cast<float>(x);
       for (int k = a; k != b; k += direction) {
         int const border = std::max(k, k + direction);
         int const bit = std::countr_zero(static_cast<unsigned>(border));
@@ -73,33 +82,50 @@ class Line {
   }
 
  private:
-  /// d of a bit at a pixel: kept where it is the finest or the weakest, else it is far from zero.
-  float difference(int x, int bit) const {
-    if (bit == 0) return finest_[x];
-    if (weakest_bit_[x] == bit) return weakest_[x];
-    return (word_[x] >> bit & 1) != 0 ? largest_[x] : static_cast<float>(-largest_[x]);
+  int whole_code(std::size_t x) const {
+    float const noise = noise_[x];
+    if (static_cast<float>(largest_[x]) < std::max(kLightSigmas * noise, kLeastLevels)) return -1;
+    int const k = binary_from_gray(word_[x]);
+    float const doubtful = kDoubtSigmas * noise;
+    bool good = k < count_;
+    if (static_cast<float>(weakest_[x]) < doubtful)
+      good = good && static_cast<float>(second_[x]) >= doubtful &&
+             (flips_to_neighbour(k, weakest_bit_[x]) ||
+              (static_cast<float>(finest_[x]) < doubtful && flips_to_neighbour(k ^ 1, weakest_bit_[x])));
+    return good ? k : -2;
+  }
+  /// d of a bit at a pixel: its size is kept where it is the finest or the weakest, else it is far from zero.
+  float difference(std::size_t x, int bit) const {
+    T const size = bit == 0 ? finest_[x] : weakest_bit_[x] == bit ? weakest_[x] : largest_[x];
+    return (word_[x] >> bit & 1) != 0 ? static_cast<float>(size) : -static_cast<float>(size);
   }
   /// All pixels from a border to pixel x have a column.
-  bool same_column(float border, int x) const {
-    for (int i = static_cast<int>(border) + 1; i <= x; ++i)
+  bool same_column(float border, std::size_t x) const {
+    for (std::size_t i = static_cast<std::size_t>(border) + 1; i <= x; ++i)
       if (code_[i] < 0) return false;
     return true;
   }
 
-  std::uint16_t const* word_;
-  std::int16_t const *finest_, *weakest_, *weakest_bit_, *largest_;
-  int const* code_;
-  float const* noise_;
-  int length_;
+  GrayBits const& bits_;
+  std::vector<float> const& of_level_;
+  cv::Mat const& levels_;
+  int count_;
+  std::uint16_t const* word_ = nullptr;
+  std::uint8_t const* weakest_bit_ = nullptr;
+  T const *finest_ = nullptr, *weakest_ = nullptr, *second_ = nullptr, *largest_ = nullptr;
+  std::vector<int> code_;
+  std::vector<float> noise_;
 };
 
 /// What the position of a border scatters, beyond noise: from second differences of three borders of one surface (whose
 /// variance is 6 of one position's), robustly.
-float border_scatter(GrayBits const& bits, cv::Mat1i const& codes, cv::Mat1f const& noise) {
+template <class T>
+float border_scatter(Line<T>& line, int rows) {
   std::vector<Border> borders;
   std::vector<float> seconds;
-  for (int y = 0; y < codes.rows; y += 8) {
-    Line(bits, codes, noise, y).find_borders(borders);
+  for (int y = 0; y < rows; y += kScatterRows) {
+    line.read(y);
+    line.find_borders(borders);
     for (std::size_t i = 2; i < borders.size(); ++i)
       if (borders[i].follows && borders[i - 1].follows)
         seconds.push_back(std::abs(borders[i].position - 2 * borders[i - 1].position + borders[i - 2].position));
@@ -110,13 +136,12 @@ float border_scatter(GrayBits const& bits, cv::Mat1i const& codes, cv::Mat1f con
   return *middle / 0.6745F / std::sqrt(6.0F);
 }
 
-/// Codes of the pixels of one line, between its borders.
-void interpolate_line(std::vector<Border> const& borders, int const* codes, int length, float scatter, float* code,
+/// Codes of the pixels of one line, between its borders; NaN where there are none.
+void interpolate_line(std::vector<Border> const& borders, std::vector<int> const& codes, float scatter, float* code,
                       float* sigma) {
-  for (int x = 0; x < length; ++x) {
-    if (codes[x] < 0) continue;
-    code[x] = static_cast<float>(codes[x]) + 0.5F;
-    sigma[x] = kUniform;
+  for (std::size_t x = 0; x < codes.size(); ++x) {
+    code[x] = codes[x] < 0 ? kMissing : static_cast<float>(codes[x]) + 0.5F;
+    sigma[x] = codes[x] < 0 ? kMissing : kUniform;
   }
   for (std::size_t i = 1; i < borders.size(); ++i) {
     Border const &a = borders[i - 1], &b = borders[i];
@@ -127,135 +152,147 @@ void interpolate_line(std::vector<Border> const& borders, int const* codes, int 
       float const share = (static_cast<float>(x) - a.position) / width;
       code[x] = static_cast<float>(a.code) + slope * (static_cast<float>(x) - a.position);
       float const at_a = (1 - share) * std::max(a.sigma, scatter), at_b = share * std::max(b.sigma, scatter);
-      sigma[x] = std::min(kUniform, std::abs(slope) * std::hypot(at_a, at_b));
+      sigma[x] = std::min(kUniform, std::abs(slope) * std::sqrt(at_a * at_a + at_b * at_b));
     }
   }
 }
 
 /// Whether the code changes more down the picture than across it.
-bool changes_down(cv::Mat1i const& codes) {
+template <class T>
+bool changes_down(Line<T>& line, int rows) {
   std::array<std::size_t, 2> changes = {0, 0};
-  for (int y = 0; y + 1 < codes.rows; y += 4)
-    for (int x = 0; x + 1 < codes.cols; ++x) {
-      int const here = codes(y, x), right = codes(y, x + 1), below = codes(y + 1, x);
+  auto const is_border = [](int a, int b) { return a != b && std::abs(a - b) <= kMostBorders; };
+  std::vector<int> codes;
+  for (int y = 0; y + 1 < rows; y += kScatterRows) {
+    line.read(y);
+    codes = line.codes();
+    line.read(y + 1);
+    for (std::size_t x = 0; x + 1 < codes.size(); ++x) {
+      int const here = codes[x], right = codes[x + 1], below = line.codes()[x];
       if (here < 0 || right < 0 || below < 0) continue;
-      changes[0] += here != right && std::abs(here - right) <= kMostBorders;
-      changes[1] += here != below && std::abs(here - below) <= kMostBorders;
+      changes[0] += is_border(here, right);
+      changes[1] += is_border(here, below);
     }
+  }
   return changes[1] > changes[0];
 }
 
-GrayBits transposed(GrayBits const& bits) {
-  GrayBits t;
-  cv::transpose(bits.word, t.word);
-  cv::transpose(bits.finest, t.finest);
-  cv::transpose(bits.weakest, t.weakest);
-  cv::transpose(bits.weakest_bit, t.weakest_bit);
-  cv::transpose(bits.largest, t.largest);
-  return t;
-}
-
-CodeImage interpolate(GrayBits const& bits, cv::Mat1i const& codes, cv::Mat1f const& noise) {
-  CodeImage image;
-  image.code = cv::Mat1f(codes.size(), kMissing);
-  image.sigma = cv::Mat1f(codes.size(), kMissing);
-  image.bias = cv::Mat1f(codes.size(), kMissing);
-  image.classes = cv::Mat1b(codes.size());
-  float const scatter = border_scatter(bits, codes, noise);
+template <class T>
+CodeImage interpolate(Line<T>& line, cv::Size size) {
+  CodeImage image{cv::Mat1f(size), cv::Mat1f(size), cv::Mat1f(size), cv::Mat1b(size), {}};
+  float const scatter = border_scatter(line, size.height);
   std::vector<Border> borders;
-  for (int y = 0; y < codes.rows; ++y) {
-    Line(bits, codes, noise, y).find_borders(borders);
-    interpolate_line(borders, codes[y], codes.cols, scatter, image.code[y], image.sigma[y]);
-    for (int x = 0; x < codes.cols; ++x) {
-      PixelClass const what = codes(y, x) >= 0    ? PixelClass::object
-                              : codes(y, x) == -1 ? PixelClass::no_light
-                                                  : PixelClass::several_peaks;
-      image.classes(y, x) = static_cast<std::uint8_t>(what);
-      if (codes(y, x) >= 0) image.bias(y, x) = 0;
+  for (int y = 0; y < size.height; ++y) {
+    line.read(y);
+    line.find_borders(borders);
+    std::vector<int> const& codes = line.codes();
+    interpolate_line(borders, codes, scatter, image.code[y], image.sigma[y]);
+    float* const bias = image.bias[y];
+    std::uint8_t* const classes = image.classes[y];
+    for (std::size_t x = 0; x < codes.size(); ++x) {
+      PixelClass const what = codes[x] >= 0    ? PixelClass::object
+                              : codes[x] == -1 ? PixelClass::no_light
+                                               : PixelClass::several_peaks;
+      classes[x] = static_cast<std::uint8_t>(what);
+      bias[x] = codes[x] >= 0 ? 0 : kMissing;
     }
   }
   return image;
 }
 
-}  // namespace
-
-void GrayBits::create(cv::Size size) {
-  constexpr std::int16_t kMost = 32767;
-  word = cv::Mat1w(size, std::uint16_t{0});
-  finest = cv::Mat1s(size, kMost);
-  weakest = cv::Mat1s(size, kMost);
-  weakest_bit = cv::Mat1s(size, std::int16_t{0});
-  second = cv::Mat1s(size, kMost);
-  largest = cv::Mat1s(size, std::int16_t{0});
-}
-
-void GrayBits::add(int bit, cv::Mat1s const& d) {
-  if (word.empty()) create(d.size());
-  for (int y = 0; y < d.rows; ++y) add_row(bit, y, d[y]);
-}
-
-void GrayBits::add_row(int bit, int y, std::int16_t const* d) {
-  auto const mask = static_cast<std::uint16_t>(1U << bit);
-  auto const this_bit = static_cast<std::int16_t>(bit);
-  int const cols = word.cols;
-  std::uint16_t* const words = word[y];
-  std::int16_t *const weak = weakest[y], *const weak_bit = weakest_bit[y], *const next = second[y],
-                      *const most = largest[y];
-  // All 16 bits wide and without branches: the compiler makes vectors of it.
-  if (bit == 0) {
-    std::copy(d, d + cols, finest[y]);
-    for (int x = 0; x < cols; ++x) {
-      std::int16_t const size = size_of(d[x]);
-      words[x] = static_cast<std::uint16_t>(words[x] | (d[x] > 0 ? mask : 0));
-      most[x] = size > most[x] ? size : most[x];
-    }
-    return;
-  }
-  for (int x = 0; x < cols; ++x) {
-    std::int16_t const value = d[x], size = size_of(value), least = size_of(weak[x]);
-    bool const weaker = size < least;
-    std::int16_t const other = weaker ? least : size;
-    words[x] = static_cast<std::uint16_t>(words[x] | (value > 0 ? mask : 0));
-    next[x] = other < next[x] ? other : next[x];
-    weak[x] = weaker ? value : weak[x];
-    weak_bit[x] = weaker ? this_bit : weak_bit[x];
-    most[x] = size > most[x] ? size : most[x];
-  }
-}
-
-cv::Mat1i whole_codes(GrayBits const& bits, cv::Mat1f const& noise_of_d, std::optional<int> count) {
-  cv::Mat1i codes(bits.word.size());
-  for (int y = 0; y < codes.rows; ++y)
-    for (int x = 0; x < codes.cols; ++x) {
-      float const noise = noise_of_d(y, x);
-      if (bits.largest(y, x) < std::max(kLightSigmas * noise, kLeastLevels)) {
-        codes(y, x) = -1;
-        continue;
-      }
-      int const k = binary_from_gray(bits.word(y, x));
-      float const doubtful = kDoubtSigmas * noise;
-      bool const weak = size_of(bits.weakest(y, x)) < doubtful;
-      bool good = !count || k < *count;
-      if (weak)
-        good = good && size_of(bits.second(y, x)) >= doubtful &&
-               (flips_to_neighbour(k, bits.weakest_bit(y, x)) ||
-                (size_of(bits.finest(y, x)) < doubtful && flips_to_neighbour(k ^ 1, bits.weakest_bit(y, x))));
-      codes(y, x) = good ? k : -2;
-    }
-  return codes;
-}
-
-CodeImage border_codes(GrayBits const& bits, cv::Mat1f const& noise_of_d, std::optional<int> count) {
-  cv::Mat1i codes = whole_codes(bits, noise_of_d, count);
-  if (!changes_down(codes)) return interpolate(bits, codes, noise_of_d);
+template <class T>
+CodeImage border_codes_of(GrayBits const& bits, DifferenceNoise const& noise, std::optional<int> count) {
+  Line<T> line(bits, noise, count);
+  if (!changes_down(line, bits.word.rows)) return interpolate(line, bits.word.size());
   // Borders lie along the lines: the same work on the picture laid on its side.
-  cv::transpose(codes, codes);
-  CodeImage image = interpolate(transposed(bits), codes, noise_of_d.t());
+  GrayBits turned;
+  DifferenceNoise turned_noise{{}, noise.of_level};
+  cv::transpose(bits.word, turned.word);
+  cv::transpose(bits.finest, turned.finest);
+  cv::transpose(bits.weakest, turned.weakest);
+  cv::transpose(bits.weakest_bit, turned.weakest_bit);
+  cv::transpose(bits.second, turned.second);
+  cv::transpose(bits.largest, turned.largest);
+  cv::transpose(noise.level, turned_noise.level);
+  Line<T> down(turned, turned_noise, count);
+  CodeImage image = interpolate(down, turned.word.size());
   cv::transpose(image.code, image.code);
   cv::transpose(image.sigma, image.sigma);
   cv::transpose(image.bias, image.bias);
   cv::transpose(image.classes, image.classes);
   return image;
+}
+
+template <class T>
+cv::Mat1i whole_codes_of(GrayBits const& bits, DifferenceNoise const& noise, std::optional<int> count) {
+  cv::Mat1i codes(bits.word.size());
+  Line<T> line(bits, noise, count);
+  for (int y = 0; y < codes.rows; ++y) {
+    line.read(y);
+    std::copy(line.codes().begin(), line.codes().end(), codes[y]);
+  }
+  return codes;
+}
+
+template <class T>
+void add_bit(GrayBits& bits, int bit, cv::Mat const& pattern, cv::Mat const& inverse) {
+  auto const mask = static_cast<std::uint16_t>(1U << bit);
+  auto const this_bit = static_cast<std::uint8_t>(bit);
+  std::vector<T> row(static_cast<std::size_t>(pattern.cols));
+  for (int y = 0; y < pattern.rows; ++y) {
+    T const *const a = pattern.ptr<T>(y), *const b = inverse.ptr<T>(y);
+    std::uint16_t* const word = bits.word[y];
+    std::uint8_t* const weakest_bit = bits.weakest_bit[y];
+    T *const weakest = bits.weakest.ptr<T>(y), *const second = bits.second.ptr<T>(y),
+             *const largest = bits.largest.ptr<T>(y), *const size = bit == 0 ? bits.finest.ptr<T>(y) : row.data();
+    int const cols = pattern.cols;
+    // Without branches, and no two of the rows overlap: the compiler makes vectors of it.
+#pragma GCC ivdep
+    for (int x = 0; x < cols; ++x) word[x] = static_cast<std::uint16_t>(word[x] | (a[x] > b[x] ? mask : 0));
+#pragma GCC ivdep
+    for (int x = 0; x < cols; ++x) {
+      T const more = a[x] > b[x] ? a[x] : b[x], less = a[x] > b[x] ? b[x] : a[x];
+      T const here = static_cast<T>(more - less), most = largest[x];
+      size[x] = here;
+      largest[x] = here > most ? here : most;
+    }
+    if (bit == 0) continue;
+#pragma GCC ivdep
+    for (int x = 0; x < cols; ++x) weakest_bit[x] = size[x] < weakest[x] ? this_bit : weakest_bit[x];
+#pragma GCC ivdep
+    for (int x = 0; x < cols; ++x) {
+      T const here = size[x], least = weakest[x], next = second[x];
+      bool const is_weaker = here < least;
+      T const other = is_weaker ? least : here;
+      second[x] = other < next ? other : next;
+      weakest[x] = is_weaker ? here : least;
+    }
+  }
+}
+
+}  // namespace
+
+void GrayBits::add(int bit, cv::Mat const& pattern, cv::Mat const& inverse) {
+  bool const is_deep = pattern.depth() == CV_16U;
+  if (word.empty()) {
+    cv::Size const size = pattern.size();
+    word = cv::Mat1w(size, std::uint16_t{0});
+    weakest_bit = cv::Mat1b(size, std::uint8_t{0});
+    for (cv::Mat* const least : {&finest, &weakest, &second})
+      *least = cv::Mat(size, pattern.depth(), cv::Scalar(is_deep ? 65535 : 255));
+    largest = cv::Mat::zeros(size, pattern.depth());
+  }
+  is_deep ? add_bit<std::uint16_t>(*this, bit, pattern, inverse) : add_bit<std::uint8_t>(*this, bit, pattern, inverse);
+}
+
+cv::Mat1i whole_codes(GrayBits const& bits, DifferenceNoise const& noise, std::optional<int> count) {
+  return bits.largest.depth() == CV_16U ? whole_codes_of<std::uint16_t>(bits, noise, count)
+                                        : whole_codes_of<std::uint8_t>(bits, noise, count);
+}
+
+CodeImage border_codes(GrayBits const& bits, DifferenceNoise const& noise, std::optional<int> count) {
+  return bits.largest.depth() == CV_16U ? border_codes_of<std::uint16_t>(bits, noise, count)
+                                        : border_codes_of<std::uint8_t>(bits, noise, count);
 }
 
 }  // namespace scanview

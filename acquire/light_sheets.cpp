@@ -73,9 +73,9 @@ double LightSheets::ratio(Match const& match) const {
 /// The code whose h is a ratio; h is monotone, and goes on straight beyond its ends.
 double LightSheets::code_of(double ratio) const {
   bool const rises = motion_.back() > motion_.front();
-  auto const after = [&](double h) { return rises ? h > ratio : h < ratio; };
-  std::size_t i = 1;
-  while (i + 1 < motion_.size() && !after(motion_[i])) ++i;
+  auto const after = [&](double value, double h) { return rises ? h > value : h < value; };
+  auto const i = static_cast<std::size_t>(std::upper_bound(motion_.begin() + 1, motion_.end() - 1, ratio, after) -
+                                          motion_.begin());
   double const step = (high_ - low_) / static_cast<double>(kKnots - 1);
   return low_ + step * (static_cast<double>(i - 1) + (ratio - motion_[i - 1]) / (motion_[i] - motion_[i - 1]));
 }

@@ -64,8 +64,8 @@ struct Partners {
       overflow = true;
       return;
     }
-    partner[static_cast<std::size_t>(count++)] = {x, code_sigma / slope, slope, std::hypot(code_bias / slope, lean),
-                                                  is_leap};
+    partner[static_cast<std::size_t>(count++)] = {
+        x, code_sigma / slope, slope, std::sqrt(code_bias * code_bias / (slope * slope) + lean * lean), is_leap};
   }
 };
 
@@ -198,7 +198,8 @@ CodeRows::Places CodeRows::find(int row, float code) const {
                          std::max(excess_bend(image_.code[row], sigma, piece.x, image_.code.cols),
                                   excess_bend(image_.code[row], sigma, piece.x + 1, image_.code.cols));
       place.sigma = std::sqrt(between_variance(sigma[piece.x], sigma[piece.x + 1], share));
-      place.bias = std::hypot(bend, (1 - share) * bias[piece.x] + share * bias[piece.x + 1]);
+      float const inherited = (1 - share) * bias[piece.x] + share * bias[piece.x + 1];
+      place.bias = std::sqrt(bend * bend + inherited * inherited);
     }
     result.place[static_cast<std::size_t>(result.count++)] = place;
   }
@@ -218,8 +219,8 @@ class Matcher {
         rectification_(rectification),
         camera_(camera),
         image_(empty_range_image(camera)),
-        disparity_(camera.height(), camera.width(), kMissing),
-        sigma_(camera.height(), camera.width(), kMissing) {
+        disparity_(image_.depth),
+        sigma_(image_.sigma) {
     left.classes.copyTo(image_.classes);
   }
 
@@ -296,6 +297,33 @@ class Matcher {
   }
   void take(int x, int y, Partner const& partner) { take(x, y, partner, rectified(x, y).x()); }
 
+  /// A disparity is the object's where enough around it support it.
+  void judge_row(int y) {
+    for (int x = 0; x < camera_.width(); ++x)
+      if (!std::isnan(disparity_(y, x)))
+        set_class(x, y, is_supported(x, y) ? PixelClass::object : PixelClass::inconsistent);
+  }
+
+  /// Depth from disparity, once all rows are judged; what is not the object's has none.
+  void triangulate_row(int y) {
+    double const scale = rectification_.right.fx() * rectification_.baseline;
+    for (int x = 0; x < camera_.width(); ++x) {
+      float const disparity = disparity_(y, x);
+      if (std::isnan(disparity)) continue;
+      if (image_.classes(y, x) != static_cast<std::uint8_t>(PixelClass::object)) {
+        image_.depth(y, x) = image_.sigma(y, x) = kMissing;
+        continue;
+      }
+      double const rectified_depth = scale / disparity;
+      double const depth = rectified_depth / (rectification_.rectified_from_left * camera_.ray_direction(x, y)).z();
+      image_.sigma(y, x) = static_cast<float>(depth * sigma_(y, x) / disparity);
+      image_.depth(y, x) = static_cast<float>(depth);
+    }
+  }
+
+  RangeImage result() { return std::move(image_); }
+
+ private:
   bool is_supported(int x, int y) const {
     int support = 0;
     for (int dy = -1; dy <= 1; ++dy)
@@ -306,27 +334,6 @@ class Matcher {
       }
     return support >= least_support_;
   }
-
-  /// Depth from disparity; a pixel without support has none.
-  void triangulate_row(int y) {
-    double const scale = rectification_.right.fx() * rectification_.baseline;
-    for (int x = 0; x < camera_.width(); ++x) {
-      if (std::isnan(disparity_(y, x))) continue;
-      if (!is_supported(x, y)) {
-        set_class(x, y, PixelClass::inconsistent);
-        continue;
-      }
-      double const rectified_depth = scale / disparity_(y, x);
-      double const depth = rectified_depth / (rectification_.rectified_from_left * camera_.ray_direction(x, y)).z();
-      image_.depth(y, x) = static_cast<float>(depth);
-      image_.sigma(y, x) = static_cast<float>(depth * sigma_(y, x) / disparity_(y, x));
-      set_class(x, y, PixelClass::object);
-    }
-  }
-
-  RangeImage result() { return std::move(image_); }
-
- private:
   /// Direction of a pixel in the rectified frame, z = 1.
   Eigen::Vector2d rectified(int x, int y) const {
     return (rectification_.rectified_from_left * camera_.ray_direction(x, y)).hnormalized();
@@ -358,7 +365,8 @@ class Matcher {
   }
   LightSheets::Match place(int x, int y, Eigen::Vector2d const& at, Partner const& partner) const {
     float const right = partner.sigma_x * partner.slope;
-    return {at.x(), at.y(), disparity(at.x(), partner.x), left_.code(y, x), std::hypot(left_.sigma(y, x), right)};
+    return {at.x(), at.y(), disparity(at.x(), partner.x), left_.code(y, x),
+            std::sqrt(left_.sigma(y, x) * left_.sigma(y, x) + right * right)};
   }
   /// Whether a partner is on the sheet of light that its code names. A leap is set right where it is: the two pixels of
   /// the right camera tell only that the surface passes between them, the sheet tells where.
@@ -390,7 +398,7 @@ class Matcher {
   Rectification const& rectification_;
   Camera const& camera_;
   RangeImage image_;
-  cv::Mat1f disparity_, sigma_;  // in pixels of the rectified right picture
+  cv::Mat1f disparity_, sigma_;  // in pixels of the rectified right picture; depth and its sigma take their place
 };
 
 std::vector<LightSheets::Match> sample_matches(Matcher const& matcher, CodeRows const& left_rows, Context& context) {
@@ -436,6 +444,7 @@ RangeImage match_codes(CodeImage const& left, std::function<CodeRows(int step)> 
     for (std::size_t i = 0; i < doubts[band].size(); ++i)
       if (settled[band][i]) matcher.take(doubts[band][i].x, doubts[band][i].y, *settled[band][i]);
   }
+  for_each_row([&](std::size_t, int y) { matcher.judge_row(y); });
   for_each_row([&](std::size_t, int y) { matcher.triangulate_row(y); });
   for (std::uint8_t const what : left.classes)
     figures.decodable += what == static_cast<std::uint8_t>(PixelClass::object);

@@ -30,25 +30,29 @@ std::array<int, kBits> differences(int column, int strength = 100) {
 }
 GrayBits bits_of(std::array<int, kBits> const& d) {
   GrayBits bits;
-  for (int bit = kBits - 1; bit >= 0; --bit)
-    bits.add(bit, cv::Mat1s(1, 1, static_cast<std::int16_t>(d[static_cast<std::size_t>(bit)])));
+  for (int bit = kBits - 1; bit >= 0; --bit) {
+    int const value = d[static_cast<std::size_t>(bit)];
+    bits.add(bit, cv::Mat1w(1, 1, static_cast<std::uint16_t>(std::max(value, 0))),
+             cv::Mat1w(1, 1, static_cast<std::uint16_t>(std::max(-value, 0))));
+  }
   return bits;
 }
+DifferenceNoise even_noise(cv::Size size, float sigma = 1) { return {cv::Mat1w::zeros(size), {sigma}}; }
 int whole(std::array<int, kBits> const& d, float noise = 1, std::optional<int> count = {}) {
-  return whole_codes(bits_of(d), cv::Mat1f(1, 1, noise), count)(0, 0);
+  return whole_codes(bits_of(d), even_noise({1, 1}, noise), count)(0, 0);
 }
 
 /// Bits whose d passes zero linearly over a column's width around each border, as a blurred stripe does.
 GrayBits bits_of(cv::Size size, Column const& column, double noise = 0) {
   GrayBits bits;
   for (int bit = kBits - 1; bit >= 0; --bit) {
-    cv::Mat1s d(size);
+    cv::Mat1w pattern(size), inverse(size, std::uint16_t{30000});
     CounterRandom random(5, static_cast<std::uint64_t>(bit));
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x)
-        d(y, x) =
-            cv::saturate_cast<std::int16_t>(4000 * (gray_stripe(column(x, y), bit) - 0.5) + noise * random.normal());
-    bits.add(bit, d);
+        pattern(y, x) = cv::saturate_cast<std::uint16_t>(30000 + 4000 * (gray_stripe(column(x, y), bit) - 0.5) +
+                                                         noise * random.normal());
+    bits.add(bit, pattern, inverse);
   }
   return bits;
 }
@@ -59,7 +63,7 @@ int count_of(CodeImage const& image, PixelClass what) {
 TEST(GrayBits, SpellTheColumn) {
   for (int column = 0; column < 1 << kBits; ++column) {
     EXPECT_EQ(whole(differences(column)), column);
-    EXPECT_EQ(whole(differences(column, 32767)), column) << "16 bits at their ends";
+    EXPECT_EQ(whole(differences(column, 65535)), column) << "16 bits at their ends";
     EXPECT_EQ(whole(differences(column), 1, 20), column < 20 ? column : -2) << "columns beyond the projector's";
   }
 }
@@ -111,7 +115,7 @@ TEST(GrayBits, DoubtGoesByTheNoise) {
 
 TEST(BorderCodes, AreLinearBetweenTheBordersThatDPassesZeroAt) {
   auto const column = [](int x, int) { return 0.31 + 0.17 * x; };
-  CodeImage const image = border_codes(bits_of({170, 3}, column), cv::Mat1f(3, 170, 1.0F), {});
+  CodeImage const image = border_codes(bits_of({170, 3}, column), even_noise({170, 3}), {});
   for (int y = 0; y < 3; ++y)
     for (int x = 0; x < 170; ++x) {
       ASSERT_TRUE(image.has_code(x, y)) << x;
@@ -128,8 +132,8 @@ TEST(BorderCodes, ACodeThatChangesDownThePictureIsReadDownThePicture) {
   auto const column = [](int x, int y) { return 1 + 0.2 * x + 0.01 * y; };
   auto const down = [&](int x, int y) { return column(y, x); };
   GrayBits const bits = bits_of({120, 40}, column, 20), turned = bits_of({40, 120}, down, 0);
-  CodeImage const image = border_codes(bits_of({120, 40}, column), cv::Mat1f(40, 120, 1.0F), {});
-  CodeImage const other = border_codes(turned, cv::Mat1f(120, 40, 1.0F), {});
+  CodeImage const image = border_codes(bits_of({120, 40}, column), even_noise({120, 40}), {});
+  CodeImage const other = border_codes(turned, even_noise({40, 120}), {});
   cv::Mat1f const code = other.code.t(), sigma = other.sigma.t();
   for (int y = 0; y < 40; ++y)
     for (int x = 0; x < 120; ++x) {
@@ -143,7 +147,7 @@ TEST(BorderCodes, ACodeThatChangesDownThePictureIsReadDownThePicture) {
 // 3 sqrt(6 / 8000) = 8 %; sigma comes from scattered second differences where they say more than noise does.
 TEST(BorderCodes, SigmaIsThatOfTheBorders) {
   auto const column = [](int x, int y) { return 1 + 0.17 * x + 0.013 * y; };
-  CodeImage const image = border_codes(bits_of({160, 40}, column, 20), cv::Mat1f(40, 160, 20.0F), {});
+  CodeImage const image = border_codes(bits_of({160, 40}, column, 20), even_noise({160, 40}, 20.0F), {});
   double squares = 0, count = 0;
   for (int y = 0; y < 40; ++y)
     for (int x = 0; x < 160; ++x) {
@@ -159,7 +163,7 @@ TEST(BorderCodes, SigmaIsThatOfTheBorders) {
 TEST(BorderCodes, PicturesOfOnePixelLineOrColumnAreRead) {
   for (cv::Size const size : {cv::Size(1, 1), cv::Size(2, 1), cv::Size(1, 2), cv::Size(40, 1), cv::Size(1, 40)}) {
     auto const column = [](int x, int y) { return 3.2 + 0.3 * (x + y); };
-    CodeImage const image = border_codes(bits_of(size, column), cv::Mat1f(size, 1.0F), {});
+    CodeImage const image = border_codes(bits_of(size, column), even_noise(size), {});
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x) {
         ASSERT_TRUE(image.has_code(x, y)) << size;
