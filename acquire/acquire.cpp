@@ -105,8 +105,8 @@ class Acquisition {
     first_view_ = decode_both(capture_.views.front(), left.camera, right.camera);
     RelativePoseOptions pose_options;
     pose_options.refine_focal = options_.refine_focal;
-    auto const matches = code_correspondences((*first_view_)[0], (*first_view_)[1]);
-    RelativePoseResult const pose = solve_relative_pose(matches, left, right, pose_options, context_);
+    RelativePoseResult const pose = solve_relative_pose(
+        code_correspondences((*first_view_)[0], (*first_view_)[1], context_), left, right, pose_options, context_);
     result_.relative_pose = pose.to_json();
     if (!pose.solved()) throw Error(ErrorCode::no_solution, capture_.file, pose.reason);
     for (auto const& held : pose.held) context_.warn(held);
