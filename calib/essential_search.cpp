@@ -17,7 +17,7 @@ namespace scanview {
 namespace {
 
 constexpr std::size_t kSample = 5;
-constexpr int kBatch = 16, kFewestSamples = 96;
+constexpr int kBatch = 16, kFewestSamples = 48;
 constexpr std::size_t kKept = 24;  // essential matrices that are decomposed at the end
 
 struct ScoredEssential {
