@@ -105,8 +105,8 @@ class Acquisition {
     first_view_ = decode_both(capture_.views.front(), left.camera, right.camera);
     RelativePoseOptions pose_options;
     pose_options.refine_focal = options_.refine_focal;
-    auto const matches = code_correspondences((*first_view_)[0], (*first_view_)[1]);
-    RelativePoseResult const pose = solve_relative_pose(matches, left, right, pose_options, context_);
+    RelativePoseResult const pose = solve_relative_pose(
+        code_correspondences((*first_view_)[0], (*first_view_)[1], context_), left, right, pose_options, context_);
     result_.relative_pose = pose.to_json();
     if (!pose.solved()) throw Error(ErrorCode::no_solution, capture_.file, pose.reason);
     for (auto const& held : pose.held) context_.warn(held);
@@ -223,23 +223,20 @@ class Acquisition {
   /// Whether texture lies on the rows where the calibration has it.
   void measure_shift(RangeImage const& image, Sides const& sides, Geometry const& geometry, AcquiredView& figures) {
     Rectification const& r = geometry.rectification;
-    cv::Mat1b left, right;
-    cv::remap(sides[0].image.lit, left, geometry.left_row_map.whole(), cv::noArray(), cv::INTER_LINEAR,
-              cv::BORDER_CONSTANT);
-    cv::remap(sides[1].image.lit, right, geometry.right_row_map.whole(), cv::noArray(), cv::INTER_LINEAR,
-              cv::BORDER_CONSTANT);
-    cv::Mat1f x_right(left.size(), kMissing);
-    for (int y = 0; y < image.depth.rows; ++y)
-      for (int x = 0; x < image.depth.cols; ++x) {
-        if (!image.has_depth(x, y)) continue;
-        Eigen::Vector3d const p = r.rectified_from_left * image.point(x, y);
-        Eigen::Vector2d const at = r.left.project(p);
-        cv::Point const pixel(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())));
-        if (!cv::Rect({0, 0}, left.size()).contains(pixel)) continue;
-        Eigen::Vector2d const there = r.right.project(p - Eigen::Vector3d(r.baseline, 0, 0));
-        x_right(pixel) = static_cast<float>(there.x() + pixel.x - at.x());
-      }
-    RigShift shift = measure_rig_shift(left, right, x_right, context_);
+    Eigen::Matrix3d const left_from_rectified = r.rectified_from_left.transpose();
+    cv::Rect const in_picture({0, 0}, image.depth.size());
+    auto const x_right = [&](int x, int y) {
+      Eigen::Vector2d const seen = image.camera.project(left_from_rectified * r.left.ray_direction(x, y));
+      if (!(std::abs(seen.x()) < in_picture.width && std::abs(seen.y()) < in_picture.height)) return kMissing;
+      cv::Point const pixel(static_cast<int>(std::lround(seen.x())), static_cast<int>(std::lround(seen.y())));
+      if (!in_picture.contains(pixel) || !image.has_depth(pixel.x, pixel.y)) return kMissing;
+      // The pixel's own match, moved by what (x, y) is beside it.
+      Eigen::Vector3d const p = r.rectified_from_left * image.point(pixel.x, pixel.y);
+      double const there = r.right.project(p - Eigen::Vector3d(r.baseline, 0, 0)).x();
+      return static_cast<float>(there + x - r.left.project(p).x());
+    };
+    RigShift shift = measure_rig_shift({sides[0].image.lit, geometry.left_row_map},
+                                       {sides[1].image.lit, geometry.right_row_map}, x_right, context_);
     reconcile(shift, sides[0].soundness, sides[1].soundness);
     figures.soundness["rig"] = shift.to_json();
     if (!shift.warning.empty()) figures.warnings.push_back(shift.warning);

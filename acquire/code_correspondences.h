@@ -9,6 +9,6 @@ namespace scanview {
 /// What both cameras saw of the same cell of the projector (column and row): the centroids of its pixels. Empty where
 /// the capture has no row bits. Cells of fewer than two pixels in a camera, or spread over more than a cell's size, are
 /// left out.
-std::vector<Correspondence> code_correspondences(DecodedSide const& left, DecodedSide const& right);
+std::vector<Correspondence> code_correspondences(DecodedSide const& left, DecodedSide const& right, Context& context);
 
 }  // namespace scanview

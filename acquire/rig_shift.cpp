@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "acquire/range_image.h"
 #include "base/error.h"
 #include "base/median.h"
 #include "base/parallel.h"
@@ -17,20 +19,65 @@ namespace scanview {
 namespace {
 
 constexpr int kHalf = 5;  // of the window
-constexpr int kWindow = (2 * kHalf + 1) * (2 * kHalf + 1);
-constexpr int kFewest = 100;  // matched pixels in a window
+constexpr int kSide = 2 * kHalf + 1, kWindow = kSide * kSide;
+constexpr float kWidest = 4 * kSide;  // columns that a window takes in the right picture: beyond, it is torn
+constexpr int kFewest = 100;          // matched pixels in a window
 constexpr double kLeastCorrelation = 0.85;
 constexpr std::size_t kFewestPoints = 30;
-constexpr double kLeastContrast = 3.0 / 255;  // RMS change from row to row, of full scale
+constexpr double kLeastContrast = 3;  // RMS change from row to row, in levels of 8 bits
 
 struct Place {
   double x = 0, y = 0, dy = 0;
 };
 
 struct Pictures {
-  cv::Mat1f left, right;  // shares of full scale
-  cv::Mat1f const& x_right;
+  MappedPicture const &left, &right;
+  std::function<float(int, int)> const& x_right;
 };
+
+// The rectified picture's value, bilinear; NaN where the camera sees nothing.
+float value_at(MappedPicture const& mapped, int x, int y) {
+  cv::Mat1b const& picture = mapped.picture;
+  cv::Vec2f const place = mapped.map.at(x, y);
+  auto const last_x = static_cast<float>(picture.cols - 1), last_y = static_cast<float>(picture.rows - 1);
+  if (!(place[0] > -0.5F && place[1] > -0.5F && place[0] < last_x + 0.5F && place[1] < last_y + 0.5F)) return kMissing;
+  float const u = std::clamp(place[0], 0.0F, last_x), v = std::clamp(place[1], 0.0F, last_y);
+  int const i = std::min(static_cast<int>(u), picture.cols - 2), j = std::min(static_cast<int>(v), picture.rows - 2);
+  float const part_u = u - static_cast<float>(i), part_v = v - static_cast<float>(j);
+  auto const along = [&](std::uint8_t const* row) {
+    return (1 - part_u) * static_cast<float>(row[i]) + part_u * static_cast<float>(row[i + 1]);
+  };
+  return (1 - part_v) * along(picture[j]) + part_v * along(picture[j + 1]);
+}
+
+// Whether the camera's own picture changes enough around a place, in any direction, to be looked at more closely.
+bool may_have_contrast(MappedPicture const& left, int x, int y) {
+  cv::Vec2f const place = left.map.at(x, y);
+  cv::Rect const inner(kHalf, kHalf, left.picture.cols - 2 * kHalf - 1, left.picture.rows - 2 * kHalf - 1);
+  if (!cv::Rect2f(inner).contains({place[0], place[1]})) return false;
+  auto const u = static_cast<int>(place[0]), v = static_cast<int>(place[1]);
+  int change = 0;
+  for (int j = -kHalf; j <= kHalf; ++j) {
+    std::uint8_t const *const row = left.picture[v + j] + u, *const below = left.picture[v + j + 1] + u;
+    for (int i = -kHalf; i <= kHalf; ++i) {
+      int const across = row[i + 1] - row[i], down = below[i] - row[i];
+      change += across * across + down * down;
+    }
+  }
+  return change >= kLeastContrast * kLeastContrast * kWindow;
+}
+
+std::optional<std::array<float, kWindow>> textured_window(MappedPicture const& left, int x, int y) {
+  std::array<float, kWindow> values;
+  auto next = values.begin();
+  for (int j = -kHalf; j <= kHalf; ++j)
+    for (int i = -kHalf; i <= kHalf; ++i) *next++ = value_at(left, x + i, y + j);
+  double change = 0;
+  for (std::size_t k = kSide; k < values.size(); ++k)
+    change += std::pow(static_cast<double>(values[k] - values[k - kSide]), 2);
+  if (!(std::sqrt(change / (kWindow - kSide)) >= kLeastContrast)) return std::nullopt;
+  return values;
+}
 
 // A window's pixels: the left values, and the matched right ones so many rows further down.
 struct Strip {
@@ -39,22 +86,41 @@ struct Strip {
   int count = 0;
 };
 
-std::optional<Strip> strip_at(Pictures const& p, int x, int y, int most) {
-  Strip strip;
-  strip.right.resize(static_cast<std::size_t>(2 * most + 1));
+std::optional<Strip> strip_at(Pictures const& p, std::array<float, kWindow> const& window, int x, int y, int most) {
+  std::array<float, kWindow> columns;
+  float first = std::numeric_limits<float>::infinity(), last = 0;
+  auto next = columns.begin();
   for (int j = -kHalf; j <= kHalf; ++j)
     for (int i = -kHalf; i <= kHalf; ++i) {
-      float const column = p.x_right(y + j, x + i);
-      if (!(column >= 0) || !(column < static_cast<float>(p.right.cols - 1))) continue;
-      auto const k = static_cast<std::size_t>(strip.count++);
-      auto const at = static_cast<int>(column);
-      float const part = column - static_cast<float>(at);
-      strip.left[k] = p.left(y + j, x + i);
-      for (int shift = -most; shift <= most; ++shift) {
-        float const* const row = p.right[y + j + shift];
-        strip.right[static_cast<std::size_t>(shift + most)][k] = (1 - part) * row[at] + part * row[at + 1];
+      float& column = *next++ = p.x_right(x + i, y + j);
+      if (!(column >= 0) || !(column < static_cast<float>(p.right.map.size().width - 1))) {
+        column = kMissing;
+        continue;
       }
+      first = std::min(first, column);
+      last = std::max(last, column);
     }
+  if (!(last - first < kWidest)) return std::nullopt;
+  // The part of the right picture that the columns lie in.
+  int const left_edge = static_cast<int>(first), width = static_cast<int>(last) + 2 - left_edge;
+  int const reach = kHalf + most;
+  cv::Mat1f part(2 * reach + 1, width);
+  for (int j = 0; j < part.rows; ++j)
+    for (int i = 0; i < width; ++i) part(j, i) = value_at(p.right, left_edge + i, y - reach + j);
+  Strip strip;
+  strip.right.resize(static_cast<std::size_t>(2 * most + 1));
+  for (int k = 0; k < kWindow; ++k) {
+    float const column = columns[static_cast<std::size_t>(k)] - static_cast<float>(left_edge);
+    if (std::isnan(column)) continue;
+    auto const at = static_cast<int>(column);
+    float const share = column - static_cast<float>(at);
+    auto const n = static_cast<std::size_t>(strip.count++);
+    strip.left[n] = window[static_cast<std::size_t>(k)];
+    for (int shift = 0; shift <= 2 * most; ++shift) {
+      float const* const row = part[k / kSide + shift];
+      strip.right[static_cast<std::size_t>(shift)][n] = (1 - share) * row[at] + share * row[at + 1];
+    }
+  }
   if (strip.count < kFewest) return std::nullopt;
   return strip;
 }
@@ -74,13 +140,11 @@ double correlation(float const* a, float const* b, int count) {
 }
 
 std::optional<double> shift_at(Pictures const& pictures, int x, int y, int most) {
-  // Enough change from row to row in the left picture, before the costly part.
-  double change = 0;
-  for (int j = -kHalf; j < kHalf; ++j)
-    for (int i = -kHalf; i <= kHalf; ++i)
-      change += std::pow(static_cast<double>(pictures.left(y + j + 1, x + i) - pictures.left(y + j, x + i)), 2);
-  if (std::sqrt(change / (kWindow - (2 * kHalf + 1))) < kLeastContrast) return std::nullopt;
-  auto const strip = strip_at(pictures, x, y, most);
+  // What is cheap to rule out first.
+  if (std::isnan(pictures.x_right(x, y)) || !may_have_contrast(pictures.left, x, y)) return std::nullopt;
+  auto const window = textured_window(pictures.left, x, y);
+  if (!window) return std::nullopt;
+  auto const strip = strip_at(pictures, *window, x, y, most);
   if (!strip) return std::nullopt;
   int best = 0;
   double highest = -1;
@@ -111,14 +175,6 @@ std::optional<double> shift_at(Pictures const& pictures, int x, int y, int most)
   return best - most + step;
 }
 
-cv::Mat1f shares(cv::Mat const& picture, char const* side) {
-  if (picture.type() != CV_8UC1 && picture.type() != CV_16UC1)
-    throw Error(ErrorCode::bad_input, {}, fmt::format("the {} picture is not gray with 8 or 16 bits", side));
-  cv::Mat1f result;
-  picture.convertTo(result, CV_32F, picture.depth() == CV_8U ? 1.0 / 255 : 1.0 / 65535);
-  return result;
-}
-
 }  // namespace
 
 Json RigShift::to_json() const {
@@ -135,24 +191,23 @@ Json RigShift::to_json() const {
           {"warning", warning}};
 }
 
-RigShift measure_rig_shift(cv::Mat const& left, cv::Mat const& right, cv::Mat1f const& x_right, Context& context,
-                           int most_px) {
-  if (left.size() != x_right.size())
-    throw Error(ErrorCode::bad_input, {}, "the matches are not of the left picture's size");
-  if (left.rows != right.rows)
+RigShift measure_rig_shift(MappedPicture const& left, MappedPicture const& right,
+                           std::function<float(int x, int y)> const& x_right, Context& context, int most_px) {
+  cv::Size const size = left.map.size();
+  if (size.height != right.map.size().height)
     throw Error(ErrorCode::bad_input, {}, "the rectified pictures differ in their number of rows");
   if (most_px < 1) throw Error(ErrorCode::usage, {}, "most_px must be at least 1");
-  Pictures const pictures{shares(left, "left"), shares(right, "right"), x_right};
+  Pictures const pictures{left, right, x_right};
   // Some five thousand places at most, whose windows do not overlap.
-  double const area = static_cast<double>(left.rows) * left.cols;
-  int const spacing = std::max(2 * kHalf + 1, static_cast<int>(std::sqrt(area / 5000)));
-  int const top = kHalf + most_px, rows = std::max(0, (left.rows - 2 * top + spacing - 1) / spacing);
+  double const area = static_cast<double>(size.height) * size.width;
+  int const spacing = std::max(kSide, static_cast<int>(std::sqrt(area / 5000)));
+  int const top = kHalf + most_px, rows = std::max(0, (size.height - 2 * top + spacing - 1) / spacing);
   std::vector<std::vector<Place>> found(static_cast<std::size_t>(rows));
   for_each_index(context, found.size(), [&](std::size_t r) {
     int const y = top + static_cast<int>(r) * spacing;
-    for (int x = kHalf; x < left.cols - kHalf; x += spacing)
+    for (int x = kHalf; x < size.width - kHalf; x += spacing)
       if (auto const dy = shift_at(pictures, x, y, most_px))
-        found[r].push_back({(x - left.cols / 2.0) / left.cols, (y - left.rows / 2.0) / left.rows, *dy});
+        found[r].push_back({(x - size.width / 2.0) / size.width, (y - size.height / 2.0) / size.height, *dy});
   });
   std::vector<Place> places;
   for (auto const& row : found) places.insert(places.end(), row.begin(), row.end());

@@ -1,8 +1,10 @@
 #pragma once
+#include <functional>
 #include <limits>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "acquire/rectification.h"
 #include "acquire/soundness.h"
 #include "base/context.h"
 #include "base/files.h"
@@ -24,13 +26,20 @@ struct RigShift {
   Json to_json() const;
 };
 
+/// A camera's picture, and where the pixels of its rectified one lie in it.
+struct MappedPicture {
+  cv::Mat1b const& picture;
+  PictureMap const& map;
+};
+
 /// Measures it from texture: where the left picture has detail, the matched strip of the right one is shifted by rows
 /// until it fits (normalised correlation over `most_px` rows up and down, then a least squares step), so neither gain
-/// nor offset of brightness matters. `left` and `right` are gray, 8 or 16 bits, rectified; `x_right` (size of `left`)
-/// is the column in the right picture that shows the left pixel, NaN where unknown. Fewer than 30 places give points
-/// and NaN. Takes milliseconds for some thousand places. Throws Error{bad_input} for other types or sizes.
-RigShift measure_rig_shift(cv::Mat const& left, cv::Mat const& right, cv::Mat1f const& x_right, Context& context,
-                           int most_px = 4);
+/// nor offset of brightness matters. `x_right(x, y)` is the column of the rectified right picture that shows that pixel
+/// of the rectified left one, NaN where unknown; it is called from several threads. Only windows are looked at, some
+/// thousand at most, which takes milliseconds whatever the pictures' size. Fewer than 30 places give points and NaN.
+/// Throws Error{bad_input} where the rectified pictures differ in their number of rows.
+RigShift measure_rig_shift(MappedPicture const& left, MappedPicture const& right,
+                           std::function<float(int x, int y)> const& x_right, Context& context, int most_px = 4);
 
 /// What the motion of a Gray capture explains is not blamed on the rig: texture comes from its first pictures, codes
 /// from the later ones, so that each camera's motion moves matches off their rows by as much.

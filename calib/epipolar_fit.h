@@ -2,6 +2,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "base/context.h"
+#include "calib/essential_search.h"
 #include "calib/stereo_rig.h"
 
 namespace scanview {
@@ -18,6 +20,7 @@ struct Correspondence {
 struct EpipolarResidual {
   double sampson_px = 0;  ///< how far both pixels together must move, to first order (Hartley, Zisserman, eq. 11.9)
   double line_px = 0;     ///< from the right pixel to the epipolar line of the left one, across that line
+  RayPair rays;           ///< the straight rays of the two pixels
 };
 EpipolarResidual epipolar_residual(StereoRig const& rig, Eigen::Vector2d const& left, Eigen::Vector2d const& right);
 
@@ -25,6 +28,7 @@ struct EpipolarFitOptions {
   bool focal = false;         ///< one factor on all four focal lengths is unknown too
   bool k1 = false;            ///< one amount added to both lenses' k1 is unknown too
   double cauchy_sigmas = 2;   ///< scale of the Cauchy loss, in standard deviations of a match; 0: plain least squares
+  double least_gain = 1e-10;  ///< it ends with a step that lowers the cost by no more than this share
   double largest_step = 0.5;  ///< the focal lengths change by at most this natural logarithm in total
 };
 
@@ -43,8 +47,8 @@ struct EpipolarFit {
 /// degrees of freedom) and what else is unknown, from `start`. A standard deviation is the larger of two: from the
 /// information matrix, scaled by the residuals found; and from the scatter of the gradient over cells of the left
 /// picture (the sandwich), which stays honest where neighbouring matches share an error. Time grows linearly; 20 000
-/// matches take a fraction of a second. At least 8 matches.
+/// matches take some hundredths of a second. At least 8 matches. The same for any number of threads.
 EpipolarFit fit_epipolar(std::vector<Correspondence> const& matches, StereoRig const& start,
-                         EpipolarFitOptions const& options = {});
+                         EpipolarFitOptions const& options, Context& context);
 
 }  // namespace scanview

@@ -8,13 +8,16 @@
 #include <limits>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
+#include <optional>
 
+#include "base/parallel.h"
 #include "base/random.h"
 
 namespace scanview {
 namespace {
 
 constexpr std::size_t kSample = 5;
+constexpr int kBatch = 16, kFewestSamples = 48;
 constexpr std::size_t kKept = 24;  // essential matrices that are decomposed at the end
 
 struct ScoredEssential {
@@ -30,11 +33,19 @@ double sampson_square(Eigen::Matrix3d const& essential, RayPair const& match) {
   return slope > 0 ? error * error / slope : 0;
 }
 
-double score_of(Eigen::Matrix3d const& essential, std::vector<RayPair> const& matches, double threshold) {
+// Where it would be above `bound`, nothing.
+std::optional<double> score_of(Eigen::Matrix3d const& essential, std::vector<RayPair> const& matches, double threshold,
+                               double bound) {
+  constexpr std::size_t kBetweenLooks = 64;
+  auto const count = static_cast<double>(matches.size());
   double const scale = 1 / (threshold * threshold);
   double sum = 0;
-  for (RayPair const& match : matches) sum += std::min(1.0, scale * sampson_square(essential, match));
-  return sum / static_cast<double>(matches.size());
+  for (std::size_t first = 0; first < matches.size(); first += kBetweenLooks) {
+    std::size_t const last = std::min(matches.size(), first + kBetweenLooks);
+    for (std::size_t i = first; i < last; ++i) sum += std::min(1.0, scale * sampson_square(essential, matches[i]));
+    if (sum > bound * count) return std::nullopt;
+  }
+  return sum / count;
 }
 
 std::vector<Eigen::Matrix3d> solve_five(std::vector<RayPair> const& matches,
@@ -64,9 +75,12 @@ std::vector<Eigen::Matrix3d> solve_five(std::vector<RayPair> const& matches,
 
 // Of the four poses of an essential matrix, the one that puts most inliers in front of both cameras.
 PoseCandidate decompose(ScoredEssential const& essential, std::vector<RayPair> const& matches, double threshold) {
+  constexpr std::size_t kEnough = 200;
   std::vector<RayPair> inliers;
-  for (RayPair const& match : matches)
+  for (RayPair const& match : matches) {
+    if (inliers.size() == kEnough) break;
     if (sampson_square(essential.matrix, match) < threshold * threshold) inliers.push_back(match);
+  }
   Eigen::JacobiSVD<Eigen::Matrix3d> const svd(essential.matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU(), v = svd.matrixV();
   if (u.determinant() < 0) u.col(2) *= -1;
@@ -88,6 +102,16 @@ PoseCandidate decompose(ScoredEssential const& essential, std::vector<RayPair> c
     }
   best.score = essential.score;
   return best;
+}
+
+std::array<std::size_t, kSample> draw(std::size_t count, std::uint64_t seed, std::uint64_t number) {
+  CounterRandom random(seed, 0x9e1a, number);
+  std::array<std::size_t, kSample> sample{};
+  for (auto next = sample.begin(); next != sample.end(); ++next) {
+    do *next = random.below(static_cast<std::uint32_t>(count));
+    while (std::find(sample.begin(), next, *next) != next);
+  }
+  return sample;
 }
 
 int samples_needed(double inlier_share, EssentialSearchOptions const& options) {
@@ -117,12 +141,18 @@ RayMeeting meet(RayPair const& match, Eigen::Isometry3d const& right_from_left) 
   return result;
 }
 
+bool in_front(RayPair const& match, Eigen::Isometry3d const& right_from_left) {
+  // The signs of the depths that meet() finds.
+  Eigen::Vector3d const a = right_from_left.linear() * match.left.homogeneous(), b = match.right.homogeneous();
+  Eigen::Vector3d const& t = right_from_left.translation();
+  if (!(a.cross(b).squaredNorm() > 0)) return true;
+  double const ab = a.dot(b), at = a.dot(t), bt = b.dot(t);
+  return ab * bt > b.squaredNorm() * at && a.squaredNorm() * bt > ab * at;
+}
+
 double share_in_front(std::vector<RayPair> const& matches, Eigen::Isometry3d const& right_from_left) {
-  std::size_t front = 0;
-  for (RayPair const& match : matches) {
-    RayMeeting const meeting = meet(match, right_from_left);
-    front += meeting.left_depth > 0 && meeting.right_depth > 0 ? 1 : 0;
-  }
+  auto const front = std::count_if(matches.begin(), matches.end(),
+                                   [&](RayPair const& match) { return in_front(match, right_from_left); });
   return static_cast<double>(front) / static_cast<double>(matches.size());
 }
 
@@ -137,23 +167,21 @@ std::vector<PoseCandidate> search_essential(std::vector<RayPair> const& matches,
   if (matches.size() <= kSample) return {};
   std::vector<ScoredEssential> kept;
   auto const better = [](ScoredEssential const& a, ScoredEssential const& b) { return a.score < b.score; };
+  // Samples of a batch are looked at in parallel, against what was kept before it.
   int needed = options.most_samples;
-  for (int iteration = 0; iteration < needed; ++iteration) {
-    if (iteration % 64 == 0) context.check_cancelled();
-    CounterRandom random(context.seed, 0x9e1a, static_cast<std::uint64_t>(iteration));
-    std::array<std::size_t, kSample> sample{};
-    for (std::size_t i = 0; i < kSample; ++i) {
-      do sample[i] = random.below(static_cast<std::uint32_t>(matches.size()));
-      while (std::find(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(i), sample[i]) !=
-             sample.begin() + static_cast<std::ptrdiff_t>(i));
-    }
-    for (Eigen::Matrix3d const& matrix : solve_five(matches, sample)) {
-      ScoredEssential const scored{matrix, score_of(matrix, matches, options.threshold)};
-      if (kept.size() == kKept && scored.score >= kept.back().score) continue;
-      kept.insert(std::upper_bound(kept.begin(), kept.end(), scored, better), scored);
-      if (kept.size() > kKept) kept.pop_back();
-    }
-    if (!kept.empty()) needed = std::max(100, samples_needed(1 - kept.front().score, options));
+  for (int done = 0; done < needed; done += kBatch) {
+    double const bound = kept.size() == kKept ? kept.back().score : 1;
+    std::array<std::vector<ScoredEssential>, kBatch> found;
+    for_each_index(context, kBatch, [&](std::size_t k) {
+      auto const sample = draw(matches.size(), context.seed, static_cast<std::uint64_t>(done) + k);
+      for (Eigen::Matrix3d const& matrix : solve_five(matches, sample))
+        if (auto const score = score_of(matrix, matches, options.threshold, bound))
+          found[k].push_back({matrix, *score});
+    });
+    for (auto const& scored : found) kept.insert(kept.end(), scored.begin(), scored.end());
+    std::stable_sort(kept.begin(), kept.end(), better);
+    kept.resize(std::min(kept.size(), kKept));
+    if (!kept.empty()) needed = std::max(kFewestSamples, samples_needed(1 - kept.front().score, options));
   }
   constexpr double kDegree = std::numbers::pi / 180;
   std::vector<PoseCandidate> candidates;

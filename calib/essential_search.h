@@ -31,6 +31,9 @@ struct EssentialSearchOptions {
 std::vector<PoseCandidate> search_essential(std::vector<RayPair> const& matches, EssentialSearchOptions const& options,
                                             Context& context);
 
+/// Whether the pose puts the point of a match in front of both cameras, or at infinity.
+bool in_front(RayPair const& match, Eigen::Isometry3d const& right_from_left);
+
 /// Share of matches that the pose puts in front of both cameras. NaN without matches.
 double share_in_front(std::vector<RayPair> const& matches, Eigen::Isometry3d const& right_from_left);
 

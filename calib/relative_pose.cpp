@@ -48,88 +48,108 @@ void for_each_match(Context& context, std::size_t count, Work const& work) {
 }
 
 // At most `count` matches spread over the left picture: round by round one of every cell that still has some, drawn at
-// random; kept in their order.
+// random. In that order, so that the first of them are spread too.
 std::vector<Correspondence> spread(std::vector<Correspondence> const& matches, Camera const& camera, std::size_t count,
                                    std::uint64_t seed) {
-  if (matches.size() <= count) return matches;
   constexpr int kColumns = 48, kRows = 32;
-  struct Key {
-    std::uint64_t random;
-    std::size_t index, cell, round;
+  struct Cell {
+    std::size_t first = 0, last = 0;  // of its matches not drawn yet
   };
-  std::vector<Key> keys(matches.size());
-  auto const at = [](double value, int size, int cells) {
-    return static_cast<std::size_t>(std::clamp(static_cast<int>((value + 0.5) / size * cells), 0, cells - 1));
+  std::vector<Cell> cells(kColumns * kRows);
+  double const columns_per_px = static_cast<double>(kColumns) / camera.width();
+  double const rows_per_px = static_cast<double>(kRows) / camera.height();
+  auto const cell_of = [&](Eigen::Vector2d const& p) -> Cell& {
+    int const column = std::clamp(static_cast<int>((p.x() + 0.5) * columns_per_px), 0, kColumns - 1);
+    int const row = std::clamp(static_cast<int>((p.y() + 0.5) * rows_per_px), 0, kRows - 1);
+    return cells[static_cast<std::size_t>(row * kColumns + column)];
   };
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    Eigen::Vector2d const& p = matches[i].left;
-    keys[i] = {CounterRandom(seed, 0x59ead, i).bits(), i,
-               at(p.y(), camera.height(), kRows) * kColumns + at(p.x(), camera.width(), kColumns), 0};
+  for (Correspondence const& match : matches) ++cell_of(match.left).last;
+  std::size_t before = 0;
+  for (Cell& cell : cells) {
+    std::size_t const size = cell.last;
+    cell.first = cell.last = before;
+    before += size;
   }
-  auto const by_random = [](Key const& a, Key const& b) {
-    return a.random != b.random ? a.random < b.random : a.index < b.index;
-  };
-  std::sort(keys.begin(), keys.end(), by_random);
-  std::vector<std::size_t> seen(kColumns * kRows, 0);
-  for (Key& key : keys) key.round = seen[key.cell]++;
-  std::nth_element(
-      keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(count), keys.end(),
-      [&](Key const& a, Key const& b) { return a.round != b.round ? a.round < b.round : by_random(a, b); });
-  keys.resize(count);
-  std::sort(keys.begin(), keys.end(), [](Key const& a, Key const& b) { return a.index < b.index; });
+  std::vector<std::size_t> by_cell(matches.size());
+  for (std::size_t i = 0; i < matches.size(); ++i) by_cell[cell_of(matches[i].left).last++] = i;
+
+  CounterRandom random(seed, 0x59ead);
+  auto const below = [&](std::size_t bound) { return random.below(static_cast<std::uint32_t>(bound)); };
+  // The cells in random order: the last round does not reach all.
+  for (std::size_t i = 1; i < cells.size(); ++i) std::swap(cells[i], cells[below(i + 1)]);
   std::vector<Correspondence> result;
-  result.reserve(count);
-  for (Key const& key : keys) result.push_back(matches[key.index]);
+  result.reserve(std::min(count, matches.size()));
+  while (result.size() < std::min(count, matches.size())) {
+    std::erase_if(cells, [](Cell const& cell) { return cell.first == cell.last; });
+    for (Cell& cell : cells) {
+      if (result.size() == count) break;
+      std::swap(by_cell[cell.first], by_cell[cell.first + below(cell.last - cell.first)]);
+      result.push_back(matches[by_cell[cell.first++]]);
+    }
+  }
   return result;
+}
+
+// The first `count` of them.
+std::vector<Correspondence> first_of(std::vector<Correspondence> const& matches, std::size_t count) {
+  return {matches.begin(), matches.begin() + static_cast<std::ptrdiff_t>(std::min(count, matches.size()))};
 }
 
 // Matches that the rig explains: within a multiple of the robust deviation and in front of both cameras.
 struct Inliers {
   std::vector<Correspondence> matches;
-  double median_px = 0, rms_px = 0, angle_rad = 0;
+  double median_px = 0, rms_px = 0;
   double deviation_sigmas = 1;  // robust deviation of sampson / sigma
 };
 
 Inliers select_inliers(std::vector<Correspondence> const& matches, StereoRig const& rig, double threshold_px,
                        Context& context) {
   struct Distance {
-    double sampson_px, line_px, angle_rad;
+    double sampson_sigmas, line_px;
   };
   std::vector<Distance> distances(matches.size());
   for_each_match(context, matches.size(), [&](std::size_t i) {
     EpipolarResidual const residual = epipolar_residual(rig, matches[i].left, matches[i].right);
-    RayMeeting const meeting = meet(rays(matches[i], rig), rig.right_from_left);
-    bool const front = meeting.left_depth > 0 && meeting.right_depth > 0;
-    distances[i] = {front ? std::abs(residual.sampson_px) : std::numeric_limits<double>::infinity(),
-                    std::abs(residual.line_px), meeting.angle_rad};
+    bool const front = in_front(residual.rays, rig.right_from_left);
+    distances[i] = {front ? std::abs(residual.sampson_px) / static_cast<double>(matches[i].sigma_px)
+                          : std::numeric_limits<double>::infinity(),
+                    std::abs(residual.line_px)};
   });
   // The deviation of what is near, then again of what that lets through: wrong matches near a line hardly count.
-  std::vector<double> limits(matches.size());
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    limits[i] = std::max(threshold_px, kInlierSigmas * static_cast<double>(matches[i].sigma_px));
   Inliers result;
+  std::vector<double> near;
+  near.reserve(matches.size());
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (distances[i].sampson_sigmas <= std::max(threshold_px / static_cast<double>(matches[i].sigma_px), kInlierSigmas))
+      near.push_back(distances[i].sampson_sigmas);
+  double most_sigmas = 0;
   for (int round = 0; round < 3; ++round) {
-    std::vector<double> normalised;
-    for (std::size_t i = 0; i < matches.size(); ++i)
-      if (distances[i].sampson_px <= limits[i])
-        normalised.push_back(distances[i].sampson_px / static_cast<double>(matches[i].sigma_px));
-    result.deviation_sigmas = 1.4826 * median(std::move(normalised));
-    for (std::size_t i = 0; i < matches.size(); ++i)
-      limits[i] = std::max(kInlierSigmas * result.deviation_sigmas, 0.1) * static_cast<double>(matches[i].sigma_px);
+    result.deviation_sigmas = 1.4826 * median(near);
+    most_sigmas = std::max(kInlierSigmas * result.deviation_sigmas, 0.1);
+    near.clear();
+    for (Distance const& distance : distances)
+      if (distance.sampson_sigmas <= most_sigmas) near.push_back(distance.sampson_sigmas);
   }
-  std::vector<double> lines, angles;
+  result.matches.reserve(near.size());
+  std::vector<double> lines;
+  lines.reserve(near.size());
   double squares = 0;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!(distances[i].sampson_px <= limits[i])) continue;
+    if (!(distances[i].sampson_sigmas <= most_sigmas)) continue;
     result.matches.push_back(matches[i]);
     lines.push_back(distances[i].line_px);
-    angles.push_back(distances[i].angle_rad);
     squares += distances[i].line_px * distances[i].line_px;
   }
   result.rms_px = std::sqrt(squares / std::max(1.0, static_cast<double>(lines.size())));
   result.median_px = median(std::move(lines));
-  result.angle_rad = median(std::move(angles));
   return result;
+}
+
+// The median angle between the two rays of a match.
+double median_angle(std::vector<RayPair> const& matches, Eigen::Isometry3d const& pose) {
+  std::vector<double> angles;
+  for (RayPair const& match : matches) angles.push_back(meet(match, pose).angle_rad);
+  return median(std::move(angles));
 }
 
 // The plane n·X = 1 (left camera, baselines) nearest to the points, robustly: inverse depth is linear in the ray.
@@ -213,24 +233,47 @@ StereoRig with_pose(StereoRig rig, Eigen::Isometry3d const& pose) {
   return rig;
 }
 
-// The candidates adjusted, the best first; each at its own optimum, and in front of the cameras.
-struct Adjusted {
-  EpipolarFit fit;
-  double cost;
-};
-std::vector<Adjusted> adjust(std::vector<Correspondence> const& matches, StereoRig const& nominal,
-                             std::vector<Eigen::Isometry3d> const& poses, EpipolarFitOptions const& options) {
-  std::vector<Adjusted> result;
-  for (Eigen::Isometry3d const& pose : poses) {
-    EpipolarFit fit = fit_epipolar(matches, with_pose(nominal, pose), options);
-    if (!fit.usable) continue;
-    double const front = share_in_front(rays(matches, fit.rig), fit.rig.right_from_left);
-    if (front < 0.5) continue;
-    double const cost = fit.cost;
-    result.push_back({std::move(fit), cost});
+// Whether two poses are of one optimum.
+bool is_same(Eigen::Isometry3d const& a, Eigen::Isometry3d const& b) {
+  return nearly_equal(a, b, 0.25 / kDegrees, 1 / kDegrees);
+}
+
+// Adjusts every pose; the best first.
+std::vector<EpipolarFit> adjust_each(std::vector<Correspondence> const& matches, StereoRig const& nominal,
+                                     std::vector<Eigen::Isometry3d> const& poses, EpipolarFitOptions const& options,
+                                     Context& context) {
+  std::vector<EpipolarFit> fits(poses.size());
+  for_each_index(context, poses.size(), [&](std::size_t i) {
+    fits[i] = fit_epipolar(matches, with_pose(nominal, poses[i]), options, context);
+  });
+  std::erase_if(fits, [](EpipolarFit const& fit) { return !fit.usable; });
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](EpipolarFit const& a, EpipolarFit const& b) { return a.cost < b.cost; });
+  return fits;
+}
+
+// The optima in front of the cameras that the poses lead to, the best first. A few matches tell which are hopeless, and
+// which the same.
+std::vector<EpipolarFit> adjust(std::vector<Correspondence> const& matches, StereoRig const& nominal,
+                                std::vector<Eigen::Isometry3d> const& poses, double cauchy_sigmas, Context& context) {
+  constexpr std::size_t kFew = 500;
+  constexpr double kHopeless = 2;  // times the best cost
+  EpipolarFitOptions options;
+  options.cauchy_sigmas = cauchy_sigmas;
+  options.least_gain = 1e-7;
+  auto const tried = adjust_each(first_of(matches, kFew), nominal, poses, options, context);
+  std::vector<Eigen::Isometry3d> hopeful;
+  for (EpipolarFit const& fit : tried) {
+    Eigen::Isometry3d const& pose = fit.rig.right_from_left;
+    if (fit.cost > kHopeless * tried.front().cost) break;
+    if (std::none_of(hopeful.begin(), hopeful.end(), [&](auto const& other) { return is_same(pose, other); }))
+      hopeful.push_back(pose);
   }
-  std::stable_sort(result.begin(), result.end(), [](Adjusted const& a, Adjusted const& b) { return a.cost < b.cost; });
-  return result;
+  auto fits = adjust_each(matches, nominal, hopeful, options, context);
+  std::erase_if(fits, [&](EpipolarFit const& fit) {
+    return share_in_front(rays(matches, fit.rig), fit.rig.right_from_left) < 0.5;
+  });
+  return fits;
 }
 
 double outermost(std::vector<Correspondence> const& matches, StereoRig const& rig) {
@@ -243,13 +286,16 @@ double outermost(std::vector<Correspondence> const& matches, StereoRig const& ri
 
 // The adjustment with what was asked for; what comes out too uncertain is held, and named.
 EpipolarFit adjust_intrinsics(std::vector<Correspondence> const& matches, EpipolarFit const& start,
-                              RelativePoseOptions const& options, double cauchy_sigmas,
-                              std::vector<std::string>& held) {
-  EpipolarFitOptions fitting{options.refine_focal, options.refine_distortion, cauchy_sigmas};
+                              RelativePoseOptions const& options, double cauchy_sigmas, std::vector<std::string>& held,
+                              Context& context) {
+  EpipolarFitOptions fitting;
+  fitting.focal = options.refine_focal;
+  fitting.k1 = options.refine_distortion;
+  fitting.cauchy_sigmas = cauchy_sigmas;
   held.clear();
   for (;;) {
-    if (!fitting.focal && !fitting.k1) return fit_epipolar(matches, start.rig, fitting);
-    EpipolarFit fit = fit_epipolar(matches, start.rig, fitting);
+    if (!fitting.focal && !fitting.k1) return fit_epipolar(matches, start.rig, fitting, context);
+    EpipolarFit fit = fit_epipolar(matches, start.rig, fitting, context);
     double const radius = outermost(matches, start.rig);
     double const bend_px = fit.k1_std * std::pow(radius, 3) * focal(start.rig.left);
     if (fitting.focal && (!fit.usable || fit.focal_std > options.max_focal_std)) {
@@ -271,36 +317,24 @@ EpipolarFit adjust_intrinsics(std::vector<Correspondence> const& matches, Epipol
   }
 }
 
-std::vector<Correspondence> usable_matches(std::vector<Correspondence> const& matches, StereoRig const& rig,
-                                           Context& context) {
+// Takes out those that a lens has no ray for.
+void keep_usable(std::vector<Correspondence>& matches, StereoRig const& rig, Context& context) {
   for (std::size_t i = 0; i < matches.size(); ++i)
     if (!matches[i].left.allFinite() || !matches[i].right.allFinite() || !std::isfinite(matches[i].sigma_px) ||
         !(matches[i].sigma_px > 0))
       throw Error(ErrorCode::bad_input, {}, fmt::format("match {} is not finite, or its deviation is not positive", i));
-  std::vector<char> good(matches.size(), 0);
+  if (rig.left.lens.is_ideal() && rig.right.lens.is_ideal()) return;
   for_each_match(context, matches.size(), [&](std::size_t i) {
     RayPair const pair = rays(matches[i], rig);
-    good[i] = pair.left.allFinite() && pair.right.allFinite() ? 1 : 0;
+    if (!pair.left.allFinite() || !pair.right.allFinite()) matches[i].sigma_px = 0;
   });
-  std::vector<Correspondence> result;
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (good[i] != 0) result.push_back(matches[i]);
-  return result;
+  std::erase_if(matches, [](Correspondence const& match) { return match.sigma_px == 0; });
 }
 
 RelativePoseResult ended(RelativePoseResult result, RelativePoseResult::Status status, std::string reason) {
   result.status = status;
   result.reason = std::move(reason);
   return result;
-}
-
-void take(RelativePoseResult& result, EpipolarFit const& fit, Inliers const& inliers, LensCamera const& given) {
-  result.rig = fit.rig;
-  result.inliers = inliers.matches.size();
-  result.epipolar_median_px = inliers.median_px;
-  result.epipolar_rms_px = inliers.rms_px;
-  result.angle_deg = kDegrees * inliers.angle_rad;
-  result.focal_factor = fit.rig.left.camera.fx() / given.camera.fx();
 }
 
 }  // namespace
@@ -352,7 +386,7 @@ Json RelativePoseResult::to_json() const {
   return json;
 }
 
-RelativePoseResult solve_relative_pose(std::vector<Correspondence> const& given, LensCamera const& left,
+RelativePoseResult solve_relative_pose(std::vector<Correspondence> matches, LensCamera const& left,
                                        LensCamera const& right, RelativePoseOptions const& options, Context& context) {
   using Status = RelativePoseResult::Status;
   options.validate();
@@ -365,7 +399,7 @@ RelativePoseResult solve_relative_pose(std::vector<Correspondence> const& given,
   nominal.right_from_left.translation() = Eigen::Vector3d::UnitX();
   RelativePoseResult result;
   result.rig = nominal;
-  auto const matches = usable_matches(given, nominal, context);
+  keep_usable(matches, nominal, context);
   result.matches = matches.size();
   if (matches.size() < options.min_matches)
     return ended(std::move(result), Status::too_few,
@@ -373,10 +407,12 @@ RelativePoseResult solve_relative_pose(std::vector<Correspondence> const& given,
                              "surface lit in both pictures?",
                              matches.size(), options.min_matches));
 
+  // The first of the chosen serve the search and the comparison of poses, all of them the pose, and all matches only
+  // its figures.
+  auto const chosen = spread(matches, left.camera, options.most_matches, context.seed);
   EssentialSearchOptions search;
   search.threshold = options.threshold_px * 2 / (focal(left) + focal(right));
-  auto const candidates =
-      search_essential(rays(spread(matches, left.camera, kSearchMatches, context.seed), nominal), search, context);
+  auto const candidates = search_essential(rays(first_of(chosen, kSearchMatches), nominal), search, context);
   std::string const no_consensus =
       "the matches do not agree on one pose of the cameras: do both pictures show the same pattern, and are the "
       "intrinsics those of these cameras?";
@@ -384,35 +420,40 @@ RelativePoseResult solve_relative_pose(std::vector<Correspondence> const& given,
   std::vector<Eigen::Isometry3d> poses;
   for (PoseCandidate const& candidate : candidates) poses.push_back(candidate.right_from_left);
 
-  // Adjusted from every candidate and from the twin that a plane would have, on fewer matches; then the best on all.
-  auto const compared = spread(matches, left.camera, kCompareMatches, context.seed + 1);
+  auto const compared = first_of(chosen, kCompareMatches);
   std::vector<double> sigmas;
   for (Correspondence const& match : compared) sigmas.push_back(static_cast<double>(match.sigma_px));
   // Unless the deviations promise better, as coarse as the search: the intrinsics may still be wrong.
-  EpipolarFitOptions const coarse{false, false, std::max(2.0, 0.5 * options.threshold_px / median(sigmas))};
-  auto const first = adjust(compared, nominal, poses, coarse);
+  double const coarse_sigmas = std::max(2.0, 0.5 * options.threshold_px / median(std::move(sigmas)));
+  auto const first = adjust(compared, nominal, poses, coarse_sigmas, context);
   if (first.empty()) return ended(std::move(result), Status::no_consensus, no_consensus);
-  Inliers inliers = select_inliers(matches, first.front().fit.rig, options.threshold_px, context);
+  EpipolarFit best = first.front();
+  Inliers inliers = select_inliers(compared, best.rig, options.threshold_px, context);
   if (static_cast<double>(inliers.matches.size()) <
-      std::max(options.min_inlier_share * static_cast<double>(matches.size()),
+      std::max(options.min_inlier_share * static_cast<double>(compared.size()),
                static_cast<double>(options.min_matches)))
     return ended(std::move(result), Status::no_consensus,
                  fmt::format("only {} of {} matches agree with the best pose: {}", inliers.matches.size(),
-                             matches.size(), no_consensus));
+                             compared.size(), no_consensus));
 
-  EpipolarFit best = first.front().fit;
-  for (bool const robust : {true, false}) {
-    double const cauchy_sigmas = robust ? 2 * std::max(1.0, inliers.deviation_sigmas) : 0;
-    auto const chosen = spread(robust ? matches : inliers.matches, left.camera, options.most_matches, context.seed + 2);
-    EpipolarFit const fit = adjust_intrinsics(chosen, best, options, cauchy_sigmas, result.held);
-    if (fit.usable) best = fit;
-    inliers = select_inliers(matches, best.rig, options.threshold_px, context);
+  auto const improve = [&](std::vector<Correspondence> const& by, double cauchy_sigmas) {
+    EpipolarFit fit = adjust_intrinsics(by, best, options, cauchy_sigmas, result.held, context);
+    if (fit.usable) best = std::move(fit);
     context.check_cancelled();
-  }
-  take(result, best, inliers, left);
-
-  auto const judged = spread(inliers.matches, left.camera, kCompareMatches, context.seed + 3);
+  };
+  improve(compared, 2 * std::max(1.0, inliers.deviation_sigmas));
+  inliers = select_inliers(chosen, best.rig, options.threshold_px, context);
+  improve(inliers.matches, 0);
+  auto const judged = first_of(inliers.matches, kCompareMatches);
   auto const judged_rays = rays(judged, best.rig);
+  inliers = select_inliers(matches, best.rig, options.threshold_px, context);
+  result.rig = best.rig;
+  result.inliers = inliers.matches.size();
+  result.epipolar_median_px = inliers.median_px;
+  result.epipolar_rms_px = inliers.rms_px;
+  result.angle_deg = kDegrees * median_angle(judged_rays, best.rig.right_from_left);
+  result.focal_factor = best.rig.left.camera.fx() / left.camera.fx();
+
   double const deviation_px = std::max(inliers.median_px, 0.05);
   double const turned_px = rotation_residual(judged_rays) * focal(left);
   if (turned_px < 3 * deviation_px)
@@ -426,20 +467,21 @@ RelativePoseResult solve_relative_pose(std::vector<Correspondence> const& given,
                              "noise; move the cameras farther apart",
                              result.angle_deg, options.min_angle_deg));
 
-  std::vector<Eigen::Isometry3d> rivals = plane_twins(judged_rays, best.rig.right_from_left);
-  for (Adjusted const& other : first) rivals.push_back(other.fit.rig.right_from_left);
-  EpipolarFitOptions const contest_options{false, false, 3 * std::max(1.0, inliers.deviation_sigmas)};
-  auto const contest = adjust(judged, best.rig, rivals, contest_options);
-  double const best_cost = fit_epipolar(judged, best.rig, contest_options).cost;
-  for (Adjusted const& other : contest) {
-    if (other.cost > kVisiblyWorse * best_cost) break;
-    double const turn = 0.25 / kDegrees, direction = 1 / kDegrees;
-    Eigen::Isometry3d const& pose = other.fit.rig.right_from_left;
-    if (nearly_equal(pose, best.rig.right_from_left, turn, direction)) continue;
-    if (share_in_front(judged_rays, pose) < 0.9) continue;
+  Eigen::Isometry3d const& chosen_pose = best.rig.right_from_left;
+  std::vector<Eigen::Isometry3d> rivals = plane_twins(judged_rays, chosen_pose);
+  for (EpipolarFit const& other : first) rivals.push_back(other.rig.right_from_left);
+  rivals.push_back(chosen_pose);
+  auto const contest = adjust(judged, best.rig, rivals, 3 * std::max(1.0, inliers.deviation_sigmas), context);
+  auto const itself = std::find_if(contest.begin(), contest.end(), [&](EpipolarFit const& fit) {
+    return is_same(fit.rig.right_from_left, chosen_pose);
+  });
+  double const cost = itself != contest.end() ? itself->cost : std::numeric_limits<double>::infinity();
+  for (EpipolarFit const& other : contest) {
+    if (other.cost > kVisiblyWorse * cost) break;
+    Eigen::Isometry3d const& pose = other.rig.right_from_left;
+    if (is_same(pose, chosen_pose) || share_in_front(judged_rays, pose) < 0.9) continue;
     result.alternative = pose;
-    double const apart =
-        std::abs(Eigen::AngleAxisd(pose.linear().transpose() * best.rig.right_from_left.linear()).angle());
+    double const apart = std::abs(Eigen::AngleAxisd(pose.linear().transpose() * chosen_pose.linear()).angle());
     return ended(std::move(result), Status::planar_ambiguous,
                  fmt::format("two poses of the cameras, {:.1f}° apart, explain the matches equally well: the scene is "
                              "nearly one plane; put something with depth into it",

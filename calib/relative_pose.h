@@ -54,8 +54,8 @@ struct RelativePoseResult {
 /// inliers of that. Wrong matches may be a good part of all. The scale is free. A nearly planar scene has a second
 /// pose: it is derived from the plane, adjusted too, and believed to be wrong only where it fits visibly worse. Throws
 /// Error{bad_input} where a match is not finite or a deviation not positive, Error{usage} for orthographic cameras.
-/// Deterministic for a seed, whatever the number of threads. Half a million matches take a few seconds.
-RelativePoseResult solve_relative_pose(std::vector<Correspondence> const& matches, LensCamera const& left,
+/// Deterministic for a seed, whatever the number of threads. Half a million matches take a few tenths of a second.
+RelativePoseResult solve_relative_pose(std::vector<Correspondence> matches, LensCamera const& left,
                                        LensCamera const& right, RelativePoseOptions const& options, Context& context);
 
 std::string to_string(RelativePoseResult::Status status);

@@ -336,6 +336,12 @@ double texture(double x, double y) {
          25 * std::cos(0.43 * y + 0.09 * x);
 }
 
+/// A rectified picture that is the camera's own.
+PictureMap own_pixels(int width, int height) {
+  Camera const camera = Camera::perspective(width, height, 300, 300, width / 2.0, height / 2.0);
+  return {camera, Eigen::Matrix3d::Identity(), LensCamera{camera, {}}};
+}
+
 RigShift shifted(std::function<double(int, int)> const& dy, double noise, std::uint64_t seed) {
   cv::Mat1b left(240, 320), right(240, 320);
   cv::Mat1f x_right(240, 320, std::numeric_limits<float>::quiet_NaN());
@@ -351,7 +357,9 @@ RigShift shifted(std::function<double(int, int)> const& dy, double noise, std::u
       if (x > disparity && (x / 40 + y / 40) % 5 != 0) x_right(y, x) = static_cast<float>(x - disparity);
     }
   Context context;
-  return measure_rig_shift(left, right, x_right, context);
+  PictureMap const map = own_pixels(320, 240);
+  return measure_rig_shift(
+      {left, map}, {right, map}, [&](int x, int y) { return x_right(y, x); }, context);
 }
 
 TEST(RigShift, AStillRigRaisesNoAlarm) {
@@ -406,11 +414,13 @@ TEST(RigShift, MotionBetweenThePicturesIsNotBlamedOnTheRig) {
 TEST(RigShift, WithoutTextureOrMatchesNothingIsClaimed) {
   Context context;
   cv::Mat1b const flat(100, 100, std::uint8_t{128});
-  auto const shift = measure_rig_shift(flat, flat, cv::Mat1f(100, 100, 50.0F), context);
+  PictureMap const map = own_pixels(100, 100), lower = own_pixels(100, 90);
+  auto const column = [](int, int) { return 50.0F; };
+  auto const shift = measure_rig_shift({flat, map}, {flat, map}, column, context);
   EXPECT_EQ(shift.points, 0U);
   EXPECT_TRUE(std::isnan(shift.median_px));
   EXPECT_TRUE(shift.warning.empty());
-  EXPECT_SCANVIEW_ERROR(measure_rig_shift(flat, flat, cv::Mat1f(90, 100), context), ErrorCode::bad_input, "size");
+  EXPECT_SCANVIEW_ERROR(measure_rig_shift({flat, map}, {flat, lower}, column, context), ErrorCode::bad_input, "rows");
 }
 
 }  // namespace

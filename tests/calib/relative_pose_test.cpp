@@ -118,8 +118,9 @@ TEST(EpipolarFit, StandardDeviationsAreHonest) {
   scene.matches = 1500;
   constexpr int kSeeds = 40;
   Eigen::Matrix<double, 6, 1> squares = Eigen::Matrix<double, 6, 1>::Zero();
+  Context context;
   for (std::uint64_t seed = 100; seed < 100 + kSeeds; ++seed)
-    squares += normalised_errors(fit_epipolar(sample(scene, seed), scene.rig).rig, scene.rig).cwiseAbs2();
+    squares += normalised_errors(fit_epipolar(sample(scene, seed), scene.rig, {}, context).rig, scene.rig).cwiseAbs2();
   for (int k = 0; k < 6; ++k) {
     // The RMS of 40 normal numbers scatters by 1/√80 = 0.11; three times that. Below, another 10 % because the larger
     // of two estimates of the deviation is reported.
