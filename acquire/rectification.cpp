@@ -110,14 +110,4 @@ void PictureMap::row(int y, std::vector<cv::Vec2f>& places) const {
   }
 }
 
-cv::Mat2f PictureMap::whole() const {
-  cv::Mat2f all(size_);
-  std::vector<cv::Vec2f> places;
-  for (int y = 0; y < all.rows; ++y) {
-    row(y, places);
-    std::copy(places.begin(), places.end(), all[y]);
-  }
-  return all;
-}
-
 }  // namespace scanview

@@ -31,8 +31,6 @@ class PictureMap {
   cv::Vec2f at(int x, int y) const;
   /// The places of a whole row, `size().width` of them.
   void row(int y, std::vector<cv::Vec2f>& places) const;
-  /// All of them, for cv::remap.
-  cv::Mat2f whole() const;
 
  private:
   cv::Size size_;

@@ -83,13 +83,22 @@ void reconcile(SoundnessFigures& left, SoundnessFigures& right) {
   auto const is_near = [](std::vector<std::size_t> const& frames, std::size_t frame) {
     return std::any_of(frames.begin(), frames.end(), [&](std::size_t f) { return f + 1 >= frame && f <= frame + 1; });
   };
-  auto const agreed = std::any_of(left.missing.begin(), left.missing.end(),
-                                  [&](std::size_t frame) { return is_near(right.missing, frame); });
-  if (agreed) return;
-  for (SoundnessFigures* figures : {&left, &right}) {
-    figures->missing.clear();
-    std::erase_if(figures->warnings, [](std::string const& w) { return w.find(kMissingFrame) != std::string::npos; });
+  auto const take_back = [&](char const* what) {
+    for (SoundnessFigures* figures : {&left, &right})
+      std::erase_if(figures->warnings, [&](std::string const& w) { return w.find(what) != std::string::npos; });
+  };
+  auto const says = [](SoundnessFigures const& figures, char const* what) {
+    return std::any_of(figures.warnings.begin(), figures.warnings.end(),
+                       [&](std::string const& w) { return w.find(what) != std::string::npos; });
+  };
+  bool const both_miss = std::any_of(left.missing.begin(), left.missing.end(),
+                                     [&](std::size_t frame) { return is_near(right.missing, frame); });
+  if (!both_miss) {
+    left.missing.clear();
+    right.missing.clear();
+    take_back(kMissingFrame);
   }
+  if (!says(left, kUnevenSteps) || !says(right, kUnevenSteps)) take_back(kUnevenSteps);
 }
 
 std::string response_warning(std::string const& camera, double gamma, double std) {

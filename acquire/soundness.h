@@ -38,10 +38,12 @@ struct SoundnessFigures {
   Json to_json() const;
 };
 
-inline constexpr char kMissingFrame[] = "a frame seems to be missing";  ///< what its warning says
+inline constexpr char kMissingFrame[] = "a frame seems to be missing";  ///< what its warning says,
+inline constexpr char kUnevenSteps[] = "the light's steps vary";        ///< and that of uneven steps
 
-/// What the left and the right camera say together: a frame is missing only where both miss it, for they see the same
-/// light. Takes a claim of one camera alone back, with its warning.
+/// What the left and the right camera say together: a frame is missing only where both miss it, and steps are uneven
+/// only where both find them so, for they see the same light, and each sees its own part of the scene besides. Takes a
+/// claim of one camera alone back, with its warning.
 void reconcile(SoundnessFigures& left, SoundnessFigures& right);
 
 /// The pixels that are looked at: some whole rows and columns, evenly spread, one after the other. All figures come

@@ -257,7 +257,7 @@ SoundnessFigures SweepSoundness::finish() {
     warn(fmt::format("the room's light varies by {:.1f} % of full scale from frame to frame: darken the room",
                      100 * figures.ambient_scatter));
   if (figures.step_scatter > kUneven)
-    warn(fmt::format("the light's steps vary by {:.0f} %: it lags behind the camera, or its drive slips",
+    warn(fmt::format("{} by {:.0f} %: it lags behind the camera, or its drive slips", kUnevenSteps,
                      100 * figures.step_scatter));
   if (figures.lit_share >= 0.01 && !(figures.beam_steps >= 0.5))
     warn(

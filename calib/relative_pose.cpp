@@ -21,9 +21,11 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr std::size_t kSearchMatches = 2000, kCompareMatches = 4000;
 constexpr double kInlierSigmas = 3.5;
-// Two poses are told apart where their mean squares differ by this share: neighbouring matches share errors, so that
-// the number of matches says little about significance.
-constexpr double kVisiblyWorse = 1.02;
+
+// Two poses are told apart where their mean squares differ by more than chance would have it. Each pose sees another
+// component of a match's noise, so that both means scatter, by sqrt(2 / matches) each; three deviations of their
+// difference. At least 2 %: neighbouring matches share errors.
+double visibly_worse(std::size_t matches) { return 1 + std::max(0.02, 6 / std::sqrt(static_cast<double>(matches))); }
 
 double focal(LensCamera const& camera) { return std::sqrt(camera.camera.fx() * camera.camera.fy()); }
 
@@ -238,7 +240,14 @@ bool is_same(Eigen::Isometry3d const& a, Eigen::Isometry3d const& b) {
   return nearly_equal(a, b, 0.25 / kDegrees, 1 / kDegrees);
 }
 
-// Adjusts every pose; the best first.
+// Without those that cannot be used.
+std::vector<EpipolarFit> best_first(std::vector<EpipolarFit> fits) {
+  std::erase_if(fits, [](EpipolarFit const& fit) { return !fit.usable; });
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](EpipolarFit const& a, EpipolarFit const& b) { return a.cost < b.cost; });
+  return fits;
+}
+
 std::vector<EpipolarFit> adjust_each(std::vector<Correspondence> const& matches, StereoRig const& nominal,
                                      std::vector<Eigen::Isometry3d> const& poses, EpipolarFitOptions const& options,
                                      Context& context) {
@@ -246,10 +255,7 @@ std::vector<EpipolarFit> adjust_each(std::vector<Correspondence> const& matches,
   for_each_index(context, poses.size(), [&](std::size_t i) {
     fits[i] = fit_epipolar(matches, with_pose(nominal, poses[i]), options, context);
   });
-  std::erase_if(fits, [](EpipolarFit const& fit) { return !fit.usable; });
-  std::stable_sort(fits.begin(), fits.end(),
-                   [](EpipolarFit const& a, EpipolarFit const& b) { return a.cost < b.cost; });
-  return fits;
+  return best_first(std::move(fits));
 }
 
 // The optima in front of the cameras that the poses lead to, the best first. A few matches tell which are hopeless, and
@@ -270,10 +276,14 @@ std::vector<EpipolarFit> adjust(std::vector<Correspondence> const& matches, Ster
       hopeful.push_back(pose);
   }
   auto fits = adjust_each(matches, nominal, hopeful, options, context);
-  std::erase_if(fits, [&](EpipolarFit const& fit) {
-    return share_in_front(rays(matches, fit.rig), fit.rig.right_from_left) < 0.5;
-  });
-  return fits;
+  // A match behind a camera is not explained: of two poses of a plane, one may have half of it there, and still fit as
+  // well or, by chance, better.
+  for (EpipolarFit& fit : fits) {
+    double const front = share_in_front(rays(matches, fit.rig), fit.rig.right_from_left);
+    fit.usable = front >= 0.5;
+    fit.cost /= front;
+  }
+  return best_first(std::move(fits));
 }
 
 double outermost(std::vector<Correspondence> const& matches, StereoRig const& rig) {
@@ -477,7 +487,7 @@ RelativePoseResult solve_relative_pose(std::vector<Correspondence> matches, Lens
   });
   double const cost = itself != contest.end() ? itself->cost : std::numeric_limits<double>::infinity();
   for (EpipolarFit const& other : contest) {
-    if (other.cost > kVisiblyWorse * cost) break;
+    if (other.cost > visibly_worse(judged.size()) * cost) break;
     Eigen::Isometry3d const& pose = other.rig.right_from_left;
     if (is_same(pose, chosen_pose) || share_in_front(judged_rays, pose) < 0.9) continue;
     result.alternative = pose;

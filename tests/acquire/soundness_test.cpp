@@ -144,6 +144,20 @@ TEST(SweepSoundness, ALaggingLightIsToldFromMissingFrames) {
   EXPECT_THAT(figures.warnings, ElementsAre(HasSubstr("steps vary")));
 }
 
+// Both cameras see the same light: what one of them alone makes of it comes from its part of the scene.
+TEST(SweepSoundness, StepsAreUnevenWhereBothCamerasSaySo) {
+  SweepFaults faults;
+  faults.times = times();
+  for (std::size_t i = 0; i < faults.times.size(); ++i) faults.times[i] += 0.3 * CounterRandom(5, i).normal();
+  auto left = sweep(faults), right = left, even = sweep({});
+  reconcile(left, right);
+  EXPECT_THAT(left.warnings, ElementsAre(HasSubstr("steps vary")));
+  EXPECT_EQ(left.warnings, right.warnings);
+  reconcile(even, right);
+  EXPECT_THAT(even.warnings, IsEmpty());
+  EXPECT_THAT(right.warnings, IsEmpty());
+}
+
 TEST(SweepSoundness, OverexposureAndANarrowBeamAreWarnedOf) {
   SweepFaults bright;
   bright.exposure = 500;
