@@ -174,6 +174,21 @@ cv::Mat3b shade_by_normal(RangeImage const& image) {
   return gray;
 }
 
+bool is_drawn_shading(RangeImage const& image) {
+  if (image.color.empty()) return false;
+  for (cv::Vec3b const& pixel : image.color)
+    if (pixel[0] != pixel[1] || pixel[1] != pixel[2]) return false;
+  cv::Mat3b const drawn = shade_by_normal(image);
+  std::size_t alike = 0, all = 0;
+  for (int y = 0; y < drawn.rows; ++y)
+    for (int x = 0; x < drawn.cols; ++x) {
+      if (!image.has_depth(x, y)) continue;
+      ++all;
+      alike += std::abs(drawn(y, x)[0] - image.color(y, x)[0]) <= 1;
+    }
+  return alike > 0.8 * static_cast<double>(all);  // what was cut away since changes normals beside it
+}
+
 std::string safe_view_name(std::string const& text) {
   std::string name;
   for (char const c : text) {

@@ -43,6 +43,8 @@ ImportResult build_import(BuildPlan const& plan, ImportOptions const& options, C
 
 /// Gray of a Lambertian surface lit from the camera; black where there is no normal.
 cv::Mat3b shade_by_normal(RangeImage const& image);
+/// Whether the colour is what shade_by_normal draws: it moves with the camera, and belongs to no point of the surface.
+bool is_drawn_shading(RangeImage const& image);
 
 /// A view name made of what is allowed in one (letters, digits, '_', '-', '.'); other characters become '_', a leading
 /// '.' too; empty becomes "view".

@@ -83,15 +83,13 @@ Json figures_of(ScanSet const& set, Alignment const& alignment) {
   return figures;
 }
 
-RegisterOptions resolve(RegisterRequest const& request, ScanSet& set, Context& context) {
+RegisterOptions resolve(RegisterRequest const& request, ScanSet& set) {
   RegisterOptions options = request.options;
   if (request.start == RegisterRequest::Start::file) {
     read_poses(request.pose_file, set);
     options.init = RegisterOptions::Init::given;
   } else if (request.start == RegisterRequest::Start::automatic && !set.has_poses()) {
-    context.warn(
-        "the views have no poses: an object that turned in front of a camera is assumed; say --init to change that");
-    options.init = RegisterOptions::Init::turntable;
+    options.init = RegisterOptions::Init::automatic;
   }
   return options;
 }
@@ -120,7 +118,7 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
   return run_stage(folder, std::move(record), mode, context, [&](StageRecord& out) {
     ScanSet set = read_scan_set(folder, context);
     set_poses(set, initial, folder / "poses.json");
-    RegisterOptions const options = resolve(request, set, context);
+    RegisterOptions const options = resolve(request, set);
     set.center = median_center(set);
     Alignment const alignment = align(set, options, context);
 

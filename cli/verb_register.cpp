@@ -62,7 +62,7 @@ Json compare_with(std::filesystem::path const& folder, std::filesystem::path con
 
 void add_register_flags(CLI::App& verb, RegisterFlags& flags) {
   verb.add_option("--init", flags.init,
-                  "given, none, turntable[:DEG[:AXIS]], or a file of poses or marks (default: given, else turntable)");
+                  "given, auto, none, turntable[:DEG[:AXIS]], or a file of poses or marks (default: given, else auto)");
   verb.add_flag("--no-refine", flags.no_refine, "Take the initial poses as they are");
 }
 
@@ -74,6 +74,8 @@ RegisterRequest resolve(RegisterFlags const& flags, std::vector<std::string> con
     request.start = RegisterRequest::Start::automatic;
   } else if (flags.init == "given") {
     request.options.init = RegisterOptions::Init::given;
+  } else if (flags.init == "auto") {
+    request.options.init = RegisterOptions::Init::automatic;
   } else if (flags.init == "none") {
     request.options.init = RegisterOptions::Init::none;
   } else if (flags.init == "turntable" || flags.init.starts_with("turntable:")) {

@@ -10,9 +10,9 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "register/alignment_figures.h"
-#include "register/feature_start.h"
 #include "register/joint_refinement.h"
 #include "register/pairwise_start.h"
+#include "register/search_start.h"
 #include "register/turntable.h"
 #include "register/view_graph.h"
 
@@ -40,7 +40,7 @@ class Aligner {
     prepare();
     initial_poses();
     if (options_.refine && set_.views.size() > 1) {
-      if (!joined_by_features_) start_from_neighbours();
+      if (!has_searched_) start_from_neighbours();
       refine();
     } else {
       update_graph(0, 0.1 * radius_);
@@ -64,7 +64,7 @@ class Aligner {
   /// whole, and a tear would never heal.
   std::map<std::pair<std::size_t, std::size_t>, Scales> pair_scales_;
   Alignment result_;
-  bool joined_by_features_ = false;
+  bool has_searched_ = false;
 
   ViewSurface const& surface(std::size_t view, std::size_t level) const {
     return views_[view].levels[std::min(level, views_[view].levels.size() - 1)];
@@ -102,13 +102,16 @@ class Aligner {
         problem_.believed = poses;
         problem_.belief_std = options_.given_std * radius_;
         break;
+      case RegisterOptions::Init::automatic:
+        search_poses();
+        break;
       case RegisterOptions::Init::none:
-        if (join_by_features()) break;
         poses.assign(set_.views.size(), Eigen::Isometry3d::Identity());
         break;
       case RegisterOptions::Init::turntable: {
-        // Print that joins all the views needs no belief in equal steps.
-        if (options_.turntable_step_deg == 0 && options_.turntable_axis.isZero() && join_by_features()) break;
+        // What joins all the views needs no belief in equal steps.
+        if (options_.turntable_step_deg == 0 && options_.turntable_axis.isZero() && search_poses()) break;
+        has_searched_ = false;
         Turntable const table =
             fit_turntable(views_, {options_.turntable_step_deg, options_.turntable_axis, radius_}, context_);
         context_.log(fmt::format("turntable: step {:.3f} deg about ({:.3f}, {:.3f}, {:.3f}), cost {:.3f}",
@@ -119,12 +122,12 @@ class Aligner {
     }
   }
 
-  bool join_by_features() {
-    FeatureStart const start = start_from_features(set_, views_, radius_, context_);
-    if (!start.joins(views_)) return false;
+  /// Whether the search joins all views.
+  bool search_poses() {
+    SearchStart const start = start_from_search(set_, views_, radius_, context_);
     problem_.object_from_camera = start.object_from_camera;
-    joined_by_features_ = true;
-    return true;
+    has_searched_ = true;
+    return start.joins(views_);
   }
 
   void update_graph(std::size_t level, double gate) {

@@ -9,7 +9,9 @@
 namespace scanview {
 
 struct RegisterOptions {
-  enum class Init { given, none, turntable } init = Init::given;
+  /// `automatic`: from the views alone (search_start.h). `none`: all at the same place. `turntable`: a search first,
+  /// where neither step nor axis are given; where it does not join all views, equal turns about one axis.
+  enum class Init { given, automatic, none, turntable } init = Init::given;
   /// `turntable`: degrees a view, positive or negative; 0: a full turn over all views.
   double turntable_step_deg = 0;
   /// `turntable`: axis direction in the first camera's coordinates; zero: fitted.

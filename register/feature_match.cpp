@@ -20,14 +20,17 @@ struct Match {
   int a, b;
 };
 
+// Descriptors have unit length: the largest product is the nearest. (Eigen: one thread, so always the same bits.)
+Eigen::MatrixXf products_of(cv::Mat const& a, cv::Mat const& b) {
+  using Rows = Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> const>;
+  return Rows(a.ptr<float>(), a.rows, a.cols) * Rows(b.ptr<float>(), b.rows, b.cols).transpose();
+}
+
 // Nearest in descriptor space, clearly nearer than the second, and mutual.
 std::vector<Match> mutual_matches(cv::Mat const& a, cv::Mat const& b) {
   std::vector<Match> matches;
   if (a.rows < 3 || b.rows < 3) return matches;
-  // Descriptors have unit length: the largest product is the nearest. (Eigen: one thread, so always the same bits.)
-  using Rows = Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> const>;
-  Eigen::MatrixXf const products =
-      Rows(a.ptr<float>(), a.rows, a.cols) * Rows(b.ptr<float>(), b.rows, b.cols).transpose();
+  Eigen::MatrixXf const products = products_of(a, b);
   std::vector<int> best_of_b(static_cast<std::size_t>(b.rows), -1);
   for (int j = 0; j < b.rows; ++j) {
     float best = -1;
@@ -59,6 +62,38 @@ std::vector<Match> mutual_matches(cv::Mat const& a, cv::Mat const& b) {
 
 }  // namespace
 
+std::vector<FeatureMatch> nearest_matches(Features const& a, Features const& b, int nearest) {
+  std::vector<FeatureMatch> matches;
+  if (a.points.empty() || b.points.empty()) return matches;
+  Eigen::MatrixXf const products = products_of(a.descriptors, b.descriptors);
+  auto const most_alike = [&](Eigen::Index count, auto const& product, auto const& add) {
+    std::vector<std::pair<float, Eigen::Index>> all;
+    for (Eigen::Index j = 0; j < count; ++j) all.emplace_back(-product(j), j);
+    auto const kept = all.begin() + std::min<Eigen::Index>(nearest, count);
+    std::partial_sort(all.begin(), kept, all.end());
+    for (auto it = all.begin(); it != kept; ++it) add(it->second, -it->first);
+  };
+  for (Eigen::Index i = 0; i < products.rows(); ++i)
+    most_alike(
+        products.cols(), [&](Eigen::Index j) { return products(i, j); },
+        [&](Eigen::Index j, float likeness) {
+          matches.push_back({static_cast<std::size_t>(i), static_cast<std::size_t>(j), likeness});
+        });
+  for (Eigen::Index j = 0; j < products.cols(); ++j)
+    most_alike(
+        products.rows(), [&](Eigen::Index i) { return products(i, j); },
+        [&](Eigen::Index i, float likeness) {
+          matches.push_back({static_cast<std::size_t>(i), static_cast<std::size_t>(j), likeness});
+        });
+  std::sort(matches.begin(), matches.end(),
+            [](FeatureMatch const& l, FeatureMatch const& r) { return std::pair(l.a, l.b) < std::pair(r.a, r.b); });
+  // What stands twice was found from both sides.
+  std::vector<FeatureMatch> mutual;
+  for (std::size_t k = 1; k < matches.size(); ++k)
+    if (matches[k].a == matches[k - 1].a && matches[k].b == matches[k - 1].b) mutual.push_back(matches[k]);
+  return mutual;
+}
+
 Features find_features(RangeImage const& image, ViewSurface const& surface) {
   Features features;
   if (image.color.empty()) return features;
@@ -85,6 +120,8 @@ Features find_features(RangeImage const& image, ViewSurface const& surface) {
     if (!(length > 0)) continue;
     row /= length;
     features.points.push_back(surface.camera.unproject(at.x, at.y, surface.depth(y, x)));
+    cv::Vec3f const& n = surface.normal(y, x);
+    features.normals.push_back({n[0], n[1], n[2]});
     features.descriptors.push_back(row);
   }
   return features;

@@ -9,11 +9,20 @@
 
 namespace scanview {
 
-/// SIFT features (Lowe 2004) of a view's colour, at pixels that lie on its surface.
+/// Points that can be recognised from another view.
 struct Features {
-  std::vector<Eigen::Vector3d> points;  ///< camera coordinates
-  cv::Mat descriptors;                  ///< a row a point
+  std::vector<Eigen::Vector3d> points, normals;  ///< camera coordinates
+  cv::Mat descriptors;                           ///< a row of unit length a point
 };
+
+struct FeatureMatch {
+  std::size_t a = 0, b = 0;
+  float likeness = 0;  ///< product of the descriptors
+};
+/// Pairs of which each is among the `nearest` most alike features of the other.
+std::vector<FeatureMatch> nearest_matches(Features const& a, Features const& b, int nearest);
+
+/// SIFT features (Lowe 2004) of a view's colour, at pixels that lie on its surface.
 /// `surface` is the view's finest level. No features without colour.
 Features find_features(RangeImage const& image, ViewSurface const& surface);
 

@@ -225,7 +225,7 @@ PairForm match_pair(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3
   if (sums.matched > 0) {
     form.information = sums.shape;
     form.gradient = sums.shape_gradient;
-    form.held = hold_free_motions(sums, form.information, form.gradient);
+    if (options.hold_free_motions) form.held = hold_free_motions(sums, form.information, form.gradient);
   } else {
     form.held = 6;
   }

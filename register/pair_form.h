@@ -27,6 +27,9 @@ struct MatchOptions {
   double geometry_share = 1, tone_share = 1;
   std::size_t max_samples = 4000;  ///< a direction
   enum class Use { shape, shape_and_tone } use = Use::shape_and_tone;
+  /// Take out the motions that only noise of normals seems to constrain. Far from the right pose normals differ because
+  /// the pose is wrong, and what would mend it must not be held.
+  bool hold_free_motions = true;
 };
 
 /// Sums over residuals of one kind, from which scale and correlation are measured.

@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "acquire/import_build.h"
+
 namespace scanview {
 namespace {
 
@@ -285,7 +287,8 @@ SurfacePyramid build_pyramid(RangeImage const& image, PyramidOptions const& opti
     level = coarser(level);
   }
   for (Level const& l : levels) pyramid.levels.push_back(fit_surface(l, pyramid.levels.empty()));
-  bool const colored = !image.color.empty() && !is_only_shading(levels.back(), pyramid.levels.back());
+  bool const colored =
+      !image.color.empty() && !is_drawn_shading(image) && !is_only_shading(levels.back(), pyramid.levels.back());
   for (std::size_t l = 0; l < levels.size(); ++l) {
     if (colored) add_tone(levels[l], pyramid.levels[l]);
     gather_samples(levels[l], options.max_samples, pyramid.levels[l]);

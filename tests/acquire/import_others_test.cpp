@@ -4,6 +4,7 @@
 
 #include "acquire/archive.h"
 #include "acquire/import.h"
+#include "acquire/import_build.h"
 #include "base/html.h"
 #include "import_fixture.h"
 #include "tests/expect_error.h"
@@ -131,6 +132,27 @@ TEST(ImportStanford, BunnyScansOverlapWithTheirPoses) {
 }
 
 // ---- nerfstudio
+
+TEST(ImportStanford, DrawnColourIsKnownFromPaint) {
+  RangeImage image = empty_range_image(Camera::perspective(60, 50, 80, 80, 29.5, 24.5));
+  for (int y = 5; y < 45; ++y)
+    for (int x = 5; x < 55; ++x) {
+      image.depth(y, x) = 2 + 0.001F * static_cast<float>((x - 30) * (x - 30) + (y - 25) * (y - 25));
+      image.sigma(y, x) = 1e-3F;
+      image.classes(y, x) = static_cast<std::uint8_t>(PixelClass::object);
+    }
+  EXPECT_FALSE(is_drawn_shading(image)) << "black";
+  image.color = shade_by_normal(image);
+  EXPECT_TRUE(is_drawn_shading(image));
+  for (int x = 10; x < 30; ++x) image.remove(x, 20, PixelClass::cut);  // since it was drawn
+  EXPECT_TRUE(is_drawn_shading(image));
+  RangeImage painted = image;
+  painted.color = image.color.clone();
+  painted.color(20, 40) = {10, 20, 30};
+  EXPECT_FALSE(is_drawn_shading(painted));
+  painted.color = image.color * 0.7;
+  EXPECT_FALSE(is_drawn_shading(painted)) << "gray, of another lamp";
+}
 
 TEST(ImportNerfstudio, AxesMaskAndUnitsAreTheirsTurnedIntoOurs) {
   TemporaryFolder folder;
