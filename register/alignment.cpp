@@ -21,8 +21,11 @@ namespace {
 
 constexpr double kMinScale = 1e-3;  // of residuals, in sigmas: views may agree perfectly
 constexpr double kMinToneScale = 5e-3;
-constexpr double kSettledStep = 0.1;  // of a pose's own standard deviation
-constexpr int kScaleRounds = 4;       // of a level, in which scales, gates and neighbours are still measured
+constexpr double kSettledStep = 0.1;                                    // of a pose's own standard deviation
+constexpr std::size_t kSamplesOfSet = 6000000, kPairSamples = 6000000;  // memory and time of a round
+constexpr std::size_t kFewSamples = 6000;                               // of a pair, while poses still move
+constexpr double kSharedErrors = 0.3;  // correlation of neighbouring samples: more of them tell nothing new
+constexpr int kScaleRounds = 4;        // of a level, in which scales, gates and neighbours are still measured
 
 // What one linearisation measured over all pairs; the next one weighs by it.
 struct Scales {
@@ -65,6 +68,7 @@ class Aligner {
   std::map<std::pair<std::size_t, std::size_t>, Scales> pair_scales_;
   Alignment result_;
   bool has_searched_ = false;
+  bool uses_all_ = false;  ///< of the finest level's samples
 
   ViewSurface const& surface(std::size_t view, std::size_t level) const {
     return views_[view].levels[std::min(level, views_[view].levels.size() - 1)];
@@ -75,7 +79,8 @@ class Aligner {
     for_each_index(
         context_, views_.size(),
         [&](std::size_t i) {
-          views_[i] = build_pyramid(set_.views[i].image, {options_.levels, 12000});
+          views_[i] = build_pyramid(set_.views[i].image,
+                                    {options_.levels, std::max<std::size_t>(12000, kSamplesOfSet / views_.size())});
         },
         "register: surfaces");
     std::vector<double> radii;
@@ -176,8 +181,9 @@ class Aligner {
     match.min_normal_cos = level > 0 ? 0.6 : 0.7;
     // Many pairs that say the same need not say it with all their samples.
     std::size_t const pairs = std::max<std::size_t>(1, graph_.edges.size());
-    match.max_samples =
-        std::clamp<std::size_t>(level > 0 ? 240000 / pairs : 480000 / pairs, 1500, level > 0 ? 3000 : 6000);
+    match.max_samples = std::clamp<std::size_t>(level > 0 ? 240000 / pairs : 480000 / pairs, 1500,
+                                                level > 0 ? kFewSamples / 2 : kFewSamples);
+    if (uses_all_) match.max_samples = std::max(match.max_samples, kPairSamples / pairs);
     if (scales_.geometry > 0) match.geometry_scale = scales_.geometry;
     if (scales_.tone > 0) match.tone_scale = scales_.tone;
     match.geometry_share = effective_share(scales_.geometry_correlation);
@@ -281,7 +287,12 @@ class Aligner {
   void refine() {
     double gate = 0.1 * radius_;
     result_.status = AlignmentStatus::not_converged;
-    for (std::size_t level = coarsest_ + 1; level-- > 0;) {
+    // Every pixel counts once the poses hardly move: the error falls with the square root of their number, where they
+    // do not share their errors.
+    for (std::size_t stage = coarsest_ + 2; stage-- > 0;) {
+      if (stage == 0 && scales_.geometry_correlation > kSharedErrors) break;
+      std::size_t const level = stage > 0 ? stage - 1 : 0;
+      uses_all_ = stage == 0;
       double const pixel = median_pixel(level);
       int const rounds = level > 0 ? std::max(2, options_.max_iterations / 8) : options_.max_iterations;
       scales_ = {};
@@ -314,9 +325,9 @@ class Aligner {
         context_.progress("register: refine", static_cast<std::size_t>(result_.iterations),
                           static_cast<std::size_t>(options_.max_iterations));
         // Far below what the data can tell, or far below what a pixel can.
-        bool const settled = step.largest < (level > 0 ? 0.1 : 0.004) * pixel ||
+        bool const settled = step.largest < (level > 0 ? 0.1 : 4e-4) * pixel ||
                              (deviations < kSettledStep && step.largest < 0.1 * pixel);
-        if (settled && level == 0) result_.status = AlignmentStatus::converged;
+        if (level == 0) result_.status = settled ? AlignmentStatus::converged : AlignmentStatus::not_converged;
         if (settled) break;
       }
     }
