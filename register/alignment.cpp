@@ -160,8 +160,8 @@ class Aligner {
       for (std::size_t i = 0; i + 1 < views_.size(); ++i) {
         bool const there =
             std::any_of(edges.begin(), edges.end(), [&](ViewGraphEdge const& e) { return e.a == i && e.b == i + 1; });
-        if (!there && options_.init != RegisterOptions::Init::given && views_[i].depths && views_[i + 1].depths)
-          edges.push_back({i, i + 1, 0, 0});
+        bool const apart = options_.init != RegisterOptions::Init::given || graph_.parts.size() > 1;
+        if (!there && apart && views_[i].depths && views_[i + 1].depths) edges.push_back({i, i + 1, 0, 0});
       }
       if (edges.empty()) return;
       graph_.parts = connected_parts(views_.size(), edges);

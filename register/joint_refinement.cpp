@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 
 namespace scanview {
 namespace {
@@ -163,6 +164,27 @@ std::string direction_text(Eigen::Vector3d direction) {
 }
 
 }  // namespace
+
+std::vector<std::size_t> place_along(std::vector<PairMeasurement> const& pairs,
+                                     std::vector<Eigen::Isometry3d>& object_from_camera) {
+  auto& poses = object_from_camera;
+  std::vector<std::size_t> part(poses.size()), used;
+  std::iota(part.begin(), part.end(), std::size_t{0});
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    auto const& [a, b] = std::pair(pairs[k].a, pairs[k].b);
+    std::size_t const keep = std::min(part[a], part[b]), go = std::max(part[a], part[b]);
+    if (keep == go) continue;
+    Eigen::Isometry3d const move = part[a] == keep ? poses[a] * pairs[k].b_from_a.inverse() * poses[b].inverse()
+                                                   : poses[b] * pairs[k].b_from_a * poses[a].inverse();
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      if (part[i] == go) {
+        poses[i] = move * poses[i];
+        part[i] = keep;
+      }
+    used.push_back(k);
+  }
+  return used;
+}
 
 JointSpectrum joint_spectrum(JointProblem const& problem) {
   std::vector<Eigen::Index> variables;

@@ -32,6 +32,11 @@ struct JointProblem {
   double belief_std = 0;
 };
 
+/// Lays views onto each other along pairs, the first pairs first, where they join parts that were apart (Kruskal). The
+/// parts move as one; the one with the smallest view stays. Returns which pairs were used.
+std::vector<std::size_t> place_along(std::vector<PairMeasurement> const& pairs,
+                                     std::vector<Eigen::Isometry3d>& object_from_camera);
+
 /// Motions of all views together, 6 numbers a view (zero for fixed views), that the pairs do not constrain, as columns
 /// of an orthonormal basis; and the covariance of the rest.
 struct JointSpectrum {

@@ -5,7 +5,9 @@
 
 #include "base/parallel.h"
 #include "register/feature_match.h"
+#include "register/pair_search.h"
 #include "register/pairwise_icp.h"
+#include "register/shape_features.h"
 
 namespace scanview {
 namespace {
@@ -48,9 +50,15 @@ Eigen::Isometry3d polish(SurfacePyramid const& a, SurfacePyramid const& b, Eigen
   return b_from_a;
 }
 
-PairMeasurement measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features const& features_a,
-                             Features const& features_b, Eigen::Isometry3d const& start, ViewGraphEdge const& edge,
-                             double radius, std::uint64_t seed, std::size_t views) {
+struct Measured {
+  PairMeasurement pair;
+  bool is_firm = false;  // the views do not contradict it
+  double cost = 1;
+};
+
+Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features const& features_a,
+                      Features const& features_b, Eigen::Isometry3d const& start, ViewGraphEdge const& edge,
+                      double radius, std::uint64_t seed, std::size_t views) {
   MatchOptions const options = cost_options(radius);
   std::vector<Eigen::Isometry3d> candidates{start};
   IcpOptions icp;
@@ -77,14 +85,30 @@ PairMeasurement measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, F
     least = cost;
     best.b_from_a = candidate;
   }
+  // Far off, each of these may have stopped at a wrong place.
+  PairSearchOptions search;
+  search.radius = radius;
+  PairPose found = search_pair(a, b, {}, {best.b_from_a}, search);
+  if (found.verdict != PairPose::Verdict::firm) {
+    ShapeFeatureOptions shape;
+    shape.radius = radius;
+    Features const shape_a = find_shape_features(level_of(a, 1), shape),
+                   shape_b = find_shape_features(level_of(b, 1), shape);
+    found = search_pair(a, b, {{&shape_a, &shape_b}, {&features_a, &features_b}}, {best.b_from_a}, search);
+    if (found.verdict == PairPose::Verdict::firm) best.b_from_a = found.b_from_a;
+  } else if (cost_at(a, b, found.b_from_a, options) < least) {
+    best.b_from_a = found.b_from_a;
+  }
   // How firmly shape and tone hold it there, as a mean form, so that strong and weak pairs differ by direction, not by
   // the number of their pixels.
-  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), best.b_from_a, a.centroid, b.centroid, options);
+  MatchOptions held = options;
+  held.hold_free_motions = false;  // else the way there would be held as well
+  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), best.b_from_a, a.centroid, b.centroid, held);
   best.center = form.center;
   double const trace = form.information.trace();
   if (trace > 0 && form.hits_ab + form.hits_ba >= 30)
     best.information = form.information * (6 / trace) / std::pow(kPairAccuracy * radius, 2);
-  return best;
+  return {best, found.verdict == PairPose::Verdict::firm, form.cost};
 }
 
 }  // namespace
@@ -112,23 +136,44 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
       features[i] = find_features(set.views[i].image, views[i].levels[0]);
   });
   JointProblem problem = start;
-  problem.pairs.resize(edges.size());
+  std::vector<Measured> measured(edges.size());
   for_each_index(
       context, edges.size(),
       [&](std::size_t e) {
         ViewGraphEdge const& edge = edges[e];
         Eigen::Isometry3d const b_from_a =
             start.object_from_camera[edge.b].inverse() * start.object_from_camera[edge.a];
-        problem.pairs[e] = measure_pair(views[edge.a], views[edge.b], features[edge.a], features[edge.b], b_from_a,
-                                        edge, problem.radius, context.seed, n);
+        measured[e] = measure_pair(views[edge.a], views[edge.b], features[edge.a], features[edge.b], b_from_a, edge,
+                                   problem.radius, context.seed, n);
       },
       "register: pairs");
-  JointSpectrum const spectrum = joint_spectrum(problem);
-  JointStep const balanced = solve_joint(problem, spectrum, PairLoss::cauchy);
-  double const before = mean_pair_cost(views, edges, start.object_from_camera, problem.radius, context);
-  double const after = mean_pair_cost(views, edges, balanced.object_from_camera, problem.radius, context);
-  context.log("pairwise start: mean cost " + std::to_string(before) + " -> " + std::to_string(after));
-  return after < before ? balanced.object_from_camera : start.object_from_camera;
+  problem.pairs.clear();
+  for (Measured const& one : measured) problem.pairs.push_back(one.pair);
+  auto const cost_of = [&](std::vector<Eigen::Isometry3d> const& poses) {
+    return mean_pair_cost(views, edges, poses, problem.radius, context);
+  };
+  auto const balanced = [&] {
+    return solve_joint(problem, joint_spectrum(problem), PairLoss::cauchy).object_from_camera;
+  };
+  std::vector<Eigen::Isometry3d> best = start.object_from_camera;
+  double const before = cost_of(best);
+  double least = before;
+  auto const take_better = [&](std::vector<Eigen::Isometry3d> const& poses) {
+    double const cost = cost_of(poses);
+    if (cost < least) least = cost, best = poses;
+  };
+  take_better(balanced());
+  // A balance holds what a pair measures loosely; where the start is far off, the way has to be gone whole.
+  std::stable_sort(measured.begin(), measured.end(),
+                   [](Measured const& l, Measured const& r) { return l.cost < r.cost; });
+  std::vector<PairMeasurement> firm;
+  for (Measured const& one : measured)
+    if (one.is_firm) firm.push_back(one.pair);
+  place_along(firm, problem.object_from_camera);
+  take_better(problem.object_from_camera);
+  take_better(balanced());
+  context.log("pairwise start: mean cost " + std::to_string(before) + " -> " + std::to_string(least));
+  return best;
 }
 
 }  // namespace scanview

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 
 #include "base/median.h"
 #include "base/parallel.h"
@@ -47,6 +46,7 @@ PairMeasurement measurement_of(Link const& link, std::vector<SurfacePyramid> con
   options.gate = 0.02 * radius;
   options.max_samples = 1000;
   options.use = MatchOptions::Use::shape;
+  options.hold_free_motions = false;
   options.geometry_scale = std::max(0.05, link.pose.misfit);
   PairForm const form = match_pair(middle_level(views[link.a]), middle_level(views[link.b]), pair.b_from_a,
                                    views[link.a].centroid, views[link.b].centroid, options);
@@ -227,26 +227,13 @@ class Search {
     std::size_t const n = views_.size();
     std::stable_sort(links_.begin(), links_.end(),
                      [](Link const& l, Link const& r) { return l.pose.check.matched > r.pose.check.matched; });
-    // Kruskal: parts grow together along the firmest links; a part's views move as one.
     SearchStart start;
     start.object_from_camera.assign(n, Eigen::Isometry3d::Identity());
-    std::vector<std::size_t> part(n);
-    std::iota(part.begin(), part.end(), std::size_t{0});
-    std::vector<ViewGraphEdge> tree;
     auto& poses = start.object_from_camera;
-    for (Link const& link : links_) {
-      std::size_t const keep = std::min(part[link.a], part[link.b]), go = std::max(part[link.a], part[link.b]);
-      if (keep == go) continue;
-      Eigen::Isometry3d const move = part[link.a] == keep
-                                         ? poses[link.a] * link.pose.b_from_a.inverse() * poses[link.b].inverse()
-                                         : poses[link.b] * link.pose.b_from_a * poses[link.a].inverse();
-      for (std::size_t i = 0; i < n; ++i)
-        if (part[i] == go) {
-          poses[i] = move * poses[i];
-          part[i] = keep;
-        }
-      tree.push_back({link.a, link.b, 0, 0});
-    }
+    std::vector<PairMeasurement> measured;
+    for (Link const& link : links_) measured.push_back(measurement_of(link, views_, radius_));
+    std::vector<ViewGraphEdge> tree;
+    for (std::size_t const k : place_along(measured, poses)) tree.push_back({links_[k].a, links_[k].b, 0, 0});
     start.parts = connected_parts(n, tree);
 
     JointProblem problem;
@@ -255,10 +242,11 @@ class Search {
     problem.fixed.assign(n, false);
     for (auto const& views_of_part : start.parts) problem.fixed[views_of_part.front()] = true;
     for (SurfacePyramid const& view : views_) problem.centroids.push_back(view.centroid);
-    for (Link const& link : links_) {
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      Link const& link = links_[k];
       Eigen::Isometry3d const b_from_a = poses[link.b].inverse() * poses[link.a];
       if (disagreement(link.pose.b_from_a, b_from_a, views_[link.a].centroid, radius_) < 2 * kAgreement * radius_)
-        problem.pairs.push_back(measurement_of(link, views_, radius_));
+        problem.pairs.push_back(measured[k]);
       else
         drop(link, "it contradicts firmer ones");
     }
