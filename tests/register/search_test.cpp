@@ -5,6 +5,7 @@
 
 #include "range_scene.h"
 #include "register/alignment.h"
+#include "register/joint_refinement.h"
 #include "register/pair_search.h"
 #include "register/search_start.h"
 #include "register/shape_features.h"
@@ -60,6 +61,39 @@ TEST(SearchStart, ThreadsDoNotChangeABit) {
   Alignment const one = align_from_nothing(set, 1), two = align_from_nothing(set, 2);
   for (std::size_t i = 0; i < set.views.size(); ++i)
     EXPECT_EQ(one.object_from_camera[i].matrix(), two.object_from_camera[i].matrix());
+}
+
+// What ICP and projection do not bring home any more, the search does.
+TEST(SearchStart, AStartThatIsFarOffIsMended) {
+  ScanSet set = scene::ring(scene::blob(), 10, 1.0, {0.003, 0, 0, 26});
+  set.views.resize(3);
+  std::vector<Eigen::Isometry3d> const truth = scene::poses_of(set);
+  scene::set_poses(set, scene::disturbed(truth, 30, 0.15 * kSize, 27));
+  RegisterOptions options;
+  options.given_std = 0;
+  Context context;
+  Alignment const got = align(set, options, context);
+  EXPECT_LE(compare_poses(set, got.object_from_camera, truth).max_deg, 0.3);
+}
+
+TEST(PlaceAlong, TheFirstPairsPlaceAndLaterOnesAreNotAsked) {
+  auto const moved = [](double x) { return Eigen::Isometry3d(Eigen::Translation3d(x, 0, 0)); };
+  std::vector<Eigen::Isometry3d> poses(4, moved(7));
+  auto const pair = [&](std::size_t a, std::size_t b, double x) {
+    PairMeasurement measurement;
+    measurement.a = a;
+    measurement.b = b;
+    measurement.b_from_a = moved(x);
+    return measurement;
+  };
+  // 2 and 3 first among themselves, then with 1, then 1 with 0; what closes the loop comes too late.
+  auto const used = place_along({pair(2, 3, 1), pair(1, 3, 5), pair(0, 1, 2), pair(0, 2, 100)}, poses);
+  EXPECT_EQ(used, (std::vector<std::size_t>{0, 1, 2}));
+  EXPECT_EQ(poses[0].translation().x(), 7) << "the smallest stays";
+  for (auto const& [a, b, x] : {std::tuple{0, 1, 2.0}, std::tuple{1, 3, 5.0}, std::tuple{2, 3, 1.0}})
+    EXPECT_NEAR((poses[static_cast<std::size_t>(b)].inverse() * poses[static_cast<std::size_t>(a)]).translation().x(),
+                x, 1e-12);
+  EXPECT_TRUE(place_along({}, poses).empty());
 }
 
 TEST(CheckPose, ASurfaceWhereTheOtherViewSawNothingContradicts) {
