@@ -184,6 +184,15 @@ Vector6d twist_of(Eigen::Isometry3d const& motion, Eigen::Vector3d const& center
   return twist;
 }
 
+double motion_difference(Eigen::Isometry3d const& l, Eigen::Isometry3d const& r, Eigen::Vector3d const& centroid,
+                         double radius) {
+  double largest = 0;
+  for (Eigen::Vector3d const& offset :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(radius, 0, 0), Eigen::Vector3d(0, radius, 0)})
+    largest = std::max(largest, (l * (centroid + offset) - r * (centroid + offset)).norm());
+  return largest;
+}
+
 bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p, SurfaceHit& hit) {
   if (surface.camera.is_perspective() && !(p.z() > 0)) return false;
   hit.pixel = surface.camera.project(p);

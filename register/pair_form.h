@@ -16,6 +16,10 @@ Eigen::Isometry3d motion(Vector6d const& twist, Eigen::Vector3d const& center, d
 /// The inverse of `motion`, for motions below half a turn.
 Vector6d twist_of(Eigen::Isometry3d const& motion, Eigen::Vector3d const& center, double radius);
 
+/// How far apart two motions carry a centroid and two points a radius beside it, at most.
+double motion_difference(Eigen::Isometry3d const& l, Eigen::Isometry3d const& r, Eigen::Vector3d const& centroid,
+                         double radius);
+
 /// Which correspondences count, and how much.
 struct MatchOptions {
   double gate = 0;  ///< depth difference beyond which two views see different surfaces, units

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/parallel.h"
 #include "register/feature_match.h"
@@ -12,6 +13,8 @@
 namespace scanview {
 namespace {
 
+constexpr double kMostDeviations = 15;  // of the given poses: farther away nothing is looked for
+constexpr double kAgainst = 0.05;       // of the radius: poses against a firm pair
 constexpr double kPairAccuracy = 0.01;  // of the radius: what a pairwise motion may be off
 
 ViewSurface const& level_of(SurfacePyramid const& view, std::size_t level) {
@@ -58,7 +61,7 @@ struct Measured {
 
 Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features const& features_a,
                       Features const& features_b, Eigen::Isometry3d const& start, ViewGraphEdge const& edge,
-                      double radius, std::uint64_t seed, std::size_t views) {
+                      double radius, double reach, std::uint64_t seed, std::size_t views) {
   MatchOptions const options = cost_options(radius);
   std::vector<Eigen::Isometry3d> candidates{start};
   IcpOptions icp;
@@ -95,6 +98,9 @@ Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features
     Features const shape_a = find_shape_features(level_of(a, 1), shape),
                    shape_b = find_shape_features(level_of(b, 1), shape);
     found = search_pair(a, b, {{&shape_a, &shape_b}, {&features_a, &features_b}}, {best.b_from_a}, search);
+    // What was told of the poses counts more than what a shape with symmetries looks like.
+    bool const within = motion_difference(found.b_from_a, start, a.centroid, radius) < reach;
+    if (!within) found.verdict = PairPose::Verdict::refused;
     if (found.verdict == PairPose::Verdict::firm) best.b_from_a = found.b_from_a;
   } else if (cost_at(a, b, found.b_from_a, options) < least) {
     best.b_from_a = found.b_from_a;
@@ -136,6 +142,8 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
       features[i] = find_features(set.views[i].image, views[i].levels[0]);
   });
   JointProblem problem = start;
+  double const reach =
+      start.belief_std > 0 ? kMostDeviations * start.belief_std : std::numeric_limits<double>::infinity();
   std::vector<Measured> measured(edges.size());
   for_each_index(
       context, edges.size(),
@@ -144,23 +152,35 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
         Eigen::Isometry3d const b_from_a =
             start.object_from_camera[edge.b].inverse() * start.object_from_camera[edge.a];
         measured[e] = measure_pair(views[edge.a], views[edge.b], features[edge.a], features[edge.b], b_from_a, edge,
-                                   problem.radius, context.seed, n);
+                                   problem.radius, reach, context.seed, n);
       },
       "register: pairs");
   problem.pairs.clear();
   for (Measured const& one : measured) problem.pairs.push_back(one.pair);
-  auto const cost_of = [&](std::vector<Eigen::Isometry3d> const& poses) {
-    return mean_pair_cost(views, edges, poses, problem.radius, context);
+  // Firm pairs first: a mean cost prefers surfaces that cover each other to those that coincide.
+  struct Price {
+    int against = 0;  // firm pairs
+    double cost = 1;
+    bool operator<(Price const& other) const { return std::pair(against, cost) < std::pair(other.against, other.cost); }
+  };
+  auto const price_of = [&](std::vector<Eigen::Isometry3d> const& poses) {
+    Price price{0, mean_pair_cost(views, edges, poses, problem.radius, context)};
+    for (Measured const& one : measured) {
+      Eigen::Isometry3d const b_from_a = poses[one.pair.b].inverse() * poses[one.pair.a];
+      double const off = motion_difference(b_from_a, one.pair.b_from_a, views[one.pair.a].centroid, problem.radius);
+      price.against += one.is_firm && off > kAgainst * problem.radius ? 1 : 0;
+    }
+    return price;
   };
   auto const balanced = [&] {
     return solve_joint(problem, joint_spectrum(problem), PairLoss::cauchy).object_from_camera;
   };
   std::vector<Eigen::Isometry3d> best = start.object_from_camera;
-  double const before = cost_of(best);
-  double least = before;
+  Price const before = price_of(best);
+  Price least = before;
   auto const take_better = [&](std::vector<Eigen::Isometry3d> const& poses) {
-    double const cost = cost_of(poses);
-    if (cost < least) least = cost, best = poses;
+    Price const price = price_of(poses);
+    if (price < least) least = price, best = poses;
   };
   take_better(balanced());
   // A balance holds what a pair measures loosely; where the start is far off, the way has to be gone whole.
@@ -172,7 +192,7 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
   place_along(firm, problem.object_from_camera);
   take_better(problem.object_from_camera);
   take_better(balanced());
-  context.log("pairwise start: mean cost " + std::to_string(before) + " -> " + std::to_string(least));
+  context.log("pairwise start: mean cost " + std::to_string(before.cost) + " -> " + std::to_string(least.cost));
   return best;
 }
 

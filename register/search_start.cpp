@@ -56,16 +56,6 @@ PairMeasurement measurement_of(Link const& link, std::vector<SurfacePyramid> con
   return pair;
 }
 
-// How far two motions of a into b disagree about where a's centroid and two points a radius beside it fall.
-double disagreement(Eigen::Isometry3d const& l, Eigen::Isometry3d const& r, Eigen::Vector3d const& centroid,
-                    double radius) {
-  double largest = 0;
-  for (Eigen::Vector3d const& offset :
-       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(radius, 0, 0), Eigen::Vector3d(0, radius, 0)})
-    largest = std::max(largest, (l * (centroid + offset) - r * (centroid + offset)).norm());
-  return largest;
-}
-
 class Search {
  public:
   Search(ScanSet const& set, std::vector<SurfacePyramid> const& views, double radius, Context& context)
@@ -177,8 +167,8 @@ class Search {
       for (std::size_t c = 0; c < views_.size(); ++c) {
         auto const there = motion.find({link.a, c}), on = motion.find({c, link.b});
         if (there == motion.end() || on == motion.end()) continue;
-        bool const closes = disagreement(on->second * there->second, link.pose.b_from_a, views_[link.a].centroid,
-                                         radius_) < 2 * kAgreement * radius_;
+        bool const closes = motion_difference(on->second * there->second, link.pose.b_from_a, views_[link.a].centroid,
+                                              radius_) < 2 * kAgreement * radius_;
         balances[k] += closes ? -1 : 1;
       }
     }
@@ -245,7 +235,7 @@ class Search {
     for (std::size_t k = 0; k < links_.size(); ++k) {
       Link const& link = links_[k];
       Eigen::Isometry3d const b_from_a = poses[link.b].inverse() * poses[link.a];
-      if (disagreement(link.pose.b_from_a, b_from_a, views_[link.a].centroid, radius_) < 2 * kAgreement * radius_)
+      if (motion_difference(link.pose.b_from_a, b_from_a, views_[link.a].centroid, radius_) < 2 * kAgreement * radius_)
         problem.pairs.push_back(measured[k]);
       else
         drop(link, "it contradicts firmer ones");
