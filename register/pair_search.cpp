@@ -200,7 +200,6 @@ PoseCheck check_pose(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry
   std::size_t of_a = 0, of_b = 0;
   check_one_way(a, b, b_from_a, gate, max_samples, check, of_a);
   check_one_way(b, a, b_from_a.inverse(), gate, max_samples, check, of_b);
-  check.asked = of_a + of_b;
   check.fewer = std::min(of_a, of_b);
   return check;
 }
@@ -249,7 +248,7 @@ PairPose search_pair(SurfacePyramid const& a, SurfacePyramid const& b,
     double const score = check.score() * agreement(likeness, check.score());
     if (score <= best_score) continue;
     best_score = score;
-    best = {candidate.b_from_a, check, misfit.in_sigmas, misfit.distance, likeness, PairPose::Verdict::refused};
+    best = {candidate.b_from_a, check, misfit.in_sigmas, likeness, PairPose::Verdict::refused};
   }
   best.verdict = judge(best, has_print);
   return best;

@@ -7,7 +7,6 @@ namespace scanview {
 /// How well a pose lets two range images explain each other, by projecting samples of each into the other. What a
 /// camera saw is surface, and what lies before it is empty: a pose that puts one view's surface there is wrong.
 struct PoseCheck {
-  std::size_t asked = 0;     ///< samples looked up, of both views
   std::size_t matched = 0;   ///< within the gate, facing alike
   std::size_t in_front = 0;  ///< before the other view's surface by more than the gate
   std::size_t crossed = 0;   ///< within the gate, facing otherwise
@@ -37,7 +36,6 @@ struct PairPose {
   Eigen::Isometry3d b_from_a = Eigen::Isometry3d::Identity();
   PoseCheck check;      ///< at the end, on the finest level that was used
   double misfit = 0;    ///< robust standard deviation of the distances, in their sigmas
-  double distance = 0;  ///< the same, units
   double likeness = 1;  ///< correlation of the print where the surfaces meet; 1 where a view has none
   /// `firm`: nothing contradicts it, and it fits as well as noise lets it. `weak`: it may be right, as poses of sensors
   /// whose depths bend are; other views must confirm it.

@@ -15,7 +15,7 @@
 namespace scanview {
 namespace {
 
-constexpr double kAgreement = 0.1;           // of the radius: links that say the same
+constexpr double kAgreement = 0.2;           // of the radius: links that say the same
 constexpr double kLinkAccuracy = 0.01;       // of the radius: what a link may be off
 constexpr double kLoneContradiction = 0.07;  // of a weak link that no triangle confirms
 constexpr double kMostMisfit = 1.6;          // of the usual link's
@@ -168,7 +168,7 @@ class Search {
         auto const there = motion.find({link.a, c}), on = motion.find({c, link.b});
         if (there == motion.end() || on == motion.end()) continue;
         bool const closes = motion_difference(on->second * there->second, link.pose.b_from_a, views_[link.a].centroid,
-                                              radius_) < 2 * kAgreement * radius_;
+                                              radius_) < kAgreement * radius_;
         balances[k] += closes ? -1 : 1;
       }
     }
@@ -235,7 +235,7 @@ class Search {
     for (std::size_t k = 0; k < links_.size(); ++k) {
       Link const& link = links_[k];
       Eigen::Isometry3d const b_from_a = poses[link.b].inverse() * poses[link.a];
-      if (motion_difference(link.pose.b_from_a, b_from_a, views_[link.a].centroid, radius_) < 2 * kAgreement * radius_)
+      if (motion_difference(link.pose.b_from_a, b_from_a, views_[link.a].centroid, radius_) < kAgreement * radius_)
         problem.pairs.push_back(measured[k]);
       else
         drop(link, "it contradicts firmer ones");
