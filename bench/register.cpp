@@ -1,5 +1,6 @@
 // What `register` reaches on pairs of views, and in what time, peers beside.
 //   bench_register TRIALS --data FOLDER   a pinned list of starts; the folder holds the Stanford archives
+//   bench_register --multiway N --data FOLDER   the ten synthetic views together, from N starts 3 degrees and 2 % off
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -10,6 +11,8 @@
 
 #include "base/error.h"
 #include "base/median.h"
+#include "base/random.h"
+#include "bench/register_open3d.h"
 #include "bench/register_pcl.h"
 #include "bench/register_trials.h"
 #include "register/alignment.h"
@@ -21,6 +24,7 @@ namespace fs = std::filesystem;
 
 struct Settings {
   fs::path trials, data;
+  int multiway = 0;
   bool automatic = false, peers = false, verbose = false;
   std::string only;
 };
@@ -112,16 +116,71 @@ void bench(Settings const& settings) {
     };
     note("scanview", run_ours(trial, set, settings.automatic, settings.verbose));
     if (!settings.peers) continue;
-    for (auto const method : {PclMethod::plane, PclMethod::gicp}) {
+    auto const peer = [&](std::string const& who, auto const& align_pair) {
       Outcome outcome;
       auto const start = std::chrono::steady_clock::now();
-      Eigen::Isometry3d const b_from_a = align_with_pcl(set, trial.start, trial.size, method);
+      Eigen::Isometry3d const b_from_a = align_pair();
       outcome.seconds = seconds_since(start);
       measure(trial, set, b_from_a, outcome);
-      note(method == PclMethod::plane ? "PCL plane" : "PCL GICP", outcome);
-    }
+      note(who, outcome);
+    };
+    peer("PCL plane", [&] { return align_with_pcl(set, trial.start, trial.size, PclMethod::plane); });
+    peer("PCL GICP", [&] { return align_with_pcl(set, trial.start, trial.size, PclMethod::gicp); });
+#ifdef SCANVIEW_WITH_OPEN3D
+    peer("Open3D plane", [&] { return align_with_open3d(set, trial.start, trial.size); });
+#endif
   }
   for (auto const& [who, tally] : tallies) tally.print(who);
+}
+
+/// All pairs whose views share 0.3 of the smaller one's surface, at the true poses.
+void print_pairs(std::string const& who, ScanSet const& set, std::vector<Eigen::Isometry3d> const& poses,
+                 std::vector<Eigen::Isometry3d> const& truth, double seconds) {
+  std::vector<double> degrees, lengths;
+  for (std::size_t a = 0; a < set.views.size(); ++a)
+    for (std::size_t b = a + 1; b < set.views.size(); ++b) {
+      ScanSet pair;
+      pair.views = {set.views[a], set.views[b]};
+      if (shared_share(set.views[a].image, set.views[b].image, truth[b].inverse() * truth[a]) < 0.3) continue;
+      PoseComparison const error = compare_poses(pair, {poses[a], poses[b]}, {truth[a], truth[b]});
+      degrees.push_back(error.max_deg);
+      lengths.push_back(error.max_length);
+    }
+  fmt::print("{:24} {} pairs: median {:.4f} deg {:.4f} mm, worst {:.4f} deg {:.4f} mm | {:.2f} s\n", who,
+             degrees.size(), median(degrees), median(lengths), *std::max_element(degrees.begin(), degrees.end()),
+             *std::max_element(lengths.begin(), lengths.end()), seconds);
+  std::cout.flush();
+}
+
+void bench_multiway(Settings const& settings) {
+  constexpr double kDegrees = 3, kShare = 0.02, kSize = 156;  // mm
+  for (int turn = 0; turn < settings.multiway; ++turn) {
+    Context context;
+    context.threads = 1;
+    context.seed += static_cast<std::uint64_t>(turn);
+    if (settings.verbose) context.on_log = [](std::string const& line) { fmt::print("  {}\n", line); };
+    ScanSet set;
+    set.unit = Unit::mm;
+    std::vector<Eigen::Isometry3d> truth;
+    for (auto const& [name, view] : read_synthetic_views(settings.data, context)) {
+      set.views.push_back(view);
+      truth.push_back(*view.object_from_camera);
+    }
+    for (std::size_t i = 0; i < set.views.size(); ++i)
+      set.views[i].object_from_camera = disturbed(truth[i], set.views[i].image, kDegrees, kShare * kSize, context.seed, i);
+    RegisterOptions options;
+    options.given_std = 0;
+    auto start = std::chrono::steady_clock::now();
+    Alignment const ours = align(set, options, context);
+    print_pairs("scanview", set, ours.object_from_camera, truth, seconds_since(start));
+#ifdef SCANVIEW_WITH_OPEN3D
+    if (settings.peers) {
+      start = std::chrono::steady_clock::now();
+      auto const theirs = multiway_with_open3d(set, kSize);
+      print_pairs("Open3D multiway", set, theirs, truth, seconds_since(start));
+    }
+#endif
+  }
 }
 
 }  // namespace
@@ -130,15 +189,17 @@ void bench(Settings const& settings) {
 int main(int argc, char** argv) {
   scanview::Settings settings;
   CLI::App app("Speed and error of register on pairs of views");
-  app.add_option("trials", settings.trials, "Pinned starts")->required();
+  app.add_option("trials", settings.trials, "Pinned starts");
+  app.add_option("--multiway", settings.multiway, "Starts of the ten synthetic views together");
   app.add_option("--data", settings.data, "Folder of the Stanford archives")->required();
   app.add_flag("--auto", settings.automatic, "From nothing instead of the start");
-  app.add_flag("--peers", settings.peers, "PCL's methods as well");
+  app.add_flag("--peers", settings.peers, "PCL's methods as well, and Open3D's where it is installed");
   app.add_flag("--verbose", settings.verbose, "A line a trial");
   app.add_option("--only", settings.only, "Trials whose set and views have this in their names");
   CLI11_PARSE(app, argc, argv);
   try {
-    scanview::bench(settings);
+    if (settings.multiway > 0) scanview::bench_multiway(settings);
+    if (!settings.trials.empty()) scanview::bench(settings);
   } catch (scanview::Error const& error) {
     std::cerr << "error: " << error.what() << '\n';
     return 1;

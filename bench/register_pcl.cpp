@@ -13,13 +13,23 @@ namespace {
 using Point = pcl::PointNormal;
 using Cloud = pcl::PointCloud<Point>;
 
-Cloud::Ptr cloud_of(RangeImage const& image, bool with_normals) {
+// PCL counts in floats: clouds lie about the origin, and a at its start.
+Eigen::Vector3d middle_of(RangeImage const& image) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (int y = 0; y < image.depth.rows; ++y)
+    for (int x = 0; x < image.depth.cols; ++x)
+      if (image.has_depth(x, y)) sum += image.point(x, y), ++count;
+  return sum / std::max(count, 1.0);
+}
+
+Cloud::Ptr cloud_of(RangeImage const& image, Eigen::Isometry3d const& pose, bool with_normals) {
   Cloud::Ptr cloud(new Cloud);
   for (int y = 0; y < image.depth.rows; ++y)
     for (int x = 0; x < image.depth.cols; ++x) {
       if (!image.has_depth(x, y)) continue;
       Point point;
-      point.getVector3fMap() = image.point(x, y).cast<float>();
+      point.getVector3fMap() = (pose * image.point(x, y)).cast<float>();
       cloud->push_back(point);
     }
   if (!with_normals) return cloud;
@@ -31,12 +41,11 @@ Cloud::Ptr cloud_of(RangeImage const& image, bool with_normals) {
 }
 
 template <class Method>
-Eigen::Isometry3d in_stages(Method& method, Cloud::Ptr const& a, Cloud::Ptr const& b, Eigen::Isometry3d const& start,
-                            double size) {
+Eigen::Isometry3d in_stages(Method& method, Cloud::Ptr const& a, Cloud::Ptr const& b, double size) {
   method.setInputSource(a);
   method.setInputTarget(b);
   method.setMaximumIterations(50);
-  Eigen::Matrix4f pose = start.matrix().cast<float>();
+  Eigen::Matrix4f pose = Eigen::Matrix4f::Identity();
   for (double const share : {0.1, 0.03, 0.008}) {
     method.setMaxCorrespondenceDistance(share * size);
     Cloud moved;
@@ -53,16 +62,21 @@ Eigen::Isometry3d in_stages(Method& method, Cloud::Ptr const& a, Cloud::Ptr cons
 
 Eigen::Isometry3d align_with_pcl(ScanSet const& set, Eigen::Isometry3d const& start, double size, PclMethod method) {
   bool const is_plane = method == PclMethod::plane;
-  Cloud::Ptr const a = cloud_of(set.views[0].image, is_plane), b = cloud_of(set.views[1].image, is_plane);
+  Eigen::Isometry3d const centred(Eigen::Translation3d(-middle_of(set.views[1].image)));
+  Cloud::Ptr const a = cloud_of(set.views[0].image, centred * start, is_plane),
+                   b = cloud_of(set.views[1].image, centred, is_plane);
+  Eigen::Isometry3d move;
   if (is_plane) {
     pcl::IterativeClosestPoint<Point, Point> icp;
     icp.setTransformationEstimation(
         std::make_shared<pcl::registration::TransformationEstimationPointToPlaneLLS<Point, Point>>());
-    return in_stages(icp, a, b, start, size);
+    move = in_stages(icp, a, b, size);
+  } else {
+    pcl::GeneralizedIterativeClosestPoint<Point, Point> gicp;
+    gicp.setCorrespondenceRandomness(10);
+    move = in_stages(gicp, a, b, size);
   }
-  pcl::GeneralizedIterativeClosestPoint<Point, Point> gicp;
-  gicp.setCorrespondenceRandomness(10);
-  return in_stages(gicp, a, b, start, size);
+  return centred.inverse() * move * centred * start;
 }
 
 }  // namespace scanview

@@ -12,6 +12,7 @@
 #include "base/files.h"
 #include "base/random.h"
 #include "mesh/triangle_mesh.h"
+#include "synth/centered_model.h"
 #include "synth/scanner.h"
 
 namespace scanview {
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMillimetres = 1000;  // a metre
 constexpr double kSynthSigma = 0.1;    // mm
+constexpr double kSynthSize = 156;     // mm, of the bunny's model
 
 struct Archive {
   char const *set, *file, *conf;
@@ -66,6 +68,7 @@ void add_synthetic(fs::path const& archive, std::map<std::string, View>& views, 
   write_file(file, files.begin()->second);
   TriangleMesh model = read_triangle_mesh(file);
   for (auto& vertex : model.vertices) vertex *= static_cast<float>(kMillimetres);
+  double const radius = centered(model).radius;
   int count = 0;
   auto const take = [&](double elevation_rad, int of, int first, int step) {
     SynthOptions options;
@@ -74,8 +77,8 @@ void add_synthetic(fs::path const& archive, std::map<std::string, View>& views, 
     options.elevation_deg = elevation_rad * 180 / std::numbers::pi;
     options.width = 512;
     options.height = 400;
-    options.distance = 8;
-    options.noise.depth_sigma = kSynthSigma / 78;
+    options.distance = 4 * kSynthSize / radius;
+    options.noise.depth_sigma = kSynthSigma / radius;
     SynthResult const result = synthesize(model, options, context);
     for (int i = first; i < of; i += step) {
       View view = result.set.views[static_cast<std::size_t>(i)];
@@ -123,7 +126,42 @@ Eigen::Vector3d random_direction(CounterRandom& random) {
   return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
 
+/// Share of from's depths within 1 mm of to's surface.
+double share_one_way(RangeImage const& from, RangeImage const& to, Eigen::Isometry3d const& to_from_from) {
+  constexpr double kWithin = 1;  // mm
+  double asked = 0, met = 0;
+  for (int y = 0; y < from.depth.rows; y += 2)
+    for (int x = 0; x < from.depth.cols; x += 2) {
+      if (!from.has_depth(x, y)) continue;
+      ++asked;
+      Eigen::Vector3d const p = to_from_from * from.point(x, y);
+      Eigen::Vector2d const at = to.camera.project(p);
+      if (!to.camera.contains(at)) continue;
+      int const u = static_cast<int>(std::lround(at.x())), v = static_cast<int>(std::lround(at.y()));
+      if (to.has_depth(u, v) && (to.point(u, v) - p).norm() < kWithin) ++met;
+    }
+  return met / std::max(asked, 1.0);
+}
+
 }  // namespace
+
+std::map<std::string, View> read_synthetic_views(fs::path const& data, Context& context) {
+  std::map<std::string, View> views;
+  add_synthetic(data / kArchives[0].file, views, context);
+  return views;
+}
+
+Eigen::Isometry3d disturbed(Eigen::Isometry3d const& target_from_camera, RangeImage const& image, double degrees,
+                            double length, std::uint64_t seed, std::size_t number) {
+  CounterRandom random(seed, number);
+  Eigen::Vector3d const centre = centroid_of(image);
+  return target_from_camera * Eigen::Translation3d(centre + length * random_direction(random)) *
+         Eigen::AngleAxisd(degrees * std::numbers::pi / 180, random_direction(random)) * Eigen::Translation3d(-centre);
+}
+
+double shared_share(RangeImage const& a, RangeImage const& b, Eigen::Isometry3d const& b_from_a) {
+  return std::max(share_one_way(a, b, b_from_a), share_one_way(b, a, b_from_a.inverse()));
+}
 
 TrialViews read_trial_views(fs::path const& data, Context& context) {
   TrialViews views;
@@ -151,12 +189,8 @@ std::vector<RegisterTrial> read_trials(fs::path const& file, fs::path const& dat
     View const &a = named(named(views, trial.set), trial.a), &b = named(named(views, trial.set), trial.b);
     if (trial.set == "synth") {
       trial.truth = b.object_from_camera->inverse() * *a.object_from_camera;
-      CounterRandom random(seed, trials.size());
-      Eigen::Vector3d const centre = centroid_of(a.image);
-      double const angle = trial.angle_deg * std::numbers::pi / 180;
-      trial.start = trial.truth *
-                    Eigen::Translation3d(centre + trial.percent / 100 * trial.size * random_direction(random)) *
-                    Eigen::AngleAxisd(angle, random_direction(random)) * Eigen::Translation3d(-centre);
+      trial.start =
+          disturbed(trial.truth, a.image, trial.angle_deg, trial.percent / 100 * trial.size, seed, trials.size());
     } else {
       auto const& conf = named(confs, trial.set);
       Eigen::Isometry3d const a_scan_from_camera = named(conf, trial.a).inverse() * *a.object_from_camera;

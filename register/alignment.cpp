@@ -198,6 +198,8 @@ class Aligner {
       Eigen::Isometry3d const b_from_a =
           problem_.object_from_camera[edge.b].inverse() * problem_.object_from_camera[edge.a];
       MatchOptions own = match;
+      own.geometry_share *= edge.independent;
+      own.tone_share *= edge.independent;
       if (auto const known = pair_scales_.find({edge.a, edge.b}); known != pair_scales_.end()) {
         own.geometry_scale = std::max(own.geometry_scale, known->second.geometry);
         own.gate = std::clamp(5 * known->second.distance, own.gate, std::max(own.gate, 0.1 * radius_));
@@ -295,19 +297,21 @@ class Aligner {
       uses_all_ = stage == 0;
       double const pixel = median_pixel(level);
       int const rounds = level > 0 ? std::max(2, options_.max_iterations / 8) : options_.max_iterations;
-      scales_ = {};
-      pair_scales_.clear();
+      if (!uses_all_) {
+        scales_ = {};
+        pair_scales_.clear();
+      }
       JointStep last;
-      double share = 1;
+      double share = 1, last_deviations = 0;
       for (int round = 0; round < rounds && result_.iterations < options_.max_iterations; ++round) {
         context_.check_cancelled();
-        bool const measures = round < kScaleRounds;
-        if (round % kScaleRounds == 0 && round <= kScaleRounds) {
+        bool const measures = round < (uses_all_ ? 1 : kScaleRounds);
+        if (round % kScaleRounds == 0 && round <= kScaleRounds && !uses_all_) {
           update_graph(std::max<std::size_t>(level, std::min<std::size_t>(1, coarsest_)), gate);
           problem_.fixed = fixed_views();
           if (graph_.edges.empty()) return;
         }
-        if (round == 0 || round == kScaleRounds) match_all(level, gate);  // the scales
+        if ((round == 0 || round == kScaleRounds) && !uses_all_) match_all(level, gate);  // the scales
         if (measures) gate = std::clamp(5 * scales_.distance, std::min(gate, 1.5 * pixel), gate);
         set_pairs(match_all(level, gate, measures ? ScaleUse::measure : ScaleUse::keep));
         JointSpectrum const spectrum = joint_spectrum(problem_);
@@ -324,9 +328,13 @@ class Aligner {
                         scales_.geometry_correlation, scales_.tone, scales_.tone_correlation, gate));
         context_.progress("register: refine", static_cast<std::size_t>(result_.iterations),
                           static_cast<std::size_t>(options_.max_iterations));
+        // Steps shrink by a steady factor: what all that follow would add up to.
+        double const factor = last_deviations > 0 ? std::min(1.0, deviations / last_deviations) : 1;
+        double const left = factor < 1 ? deviations * factor / (1 - factor) : deviations;
+        last_deviations = share == 1 ? deviations : 0;
         // Far below what the data can tell, or far below what a pixel can.
         bool const settled = step.largest < (level > 0 ? 0.1 : 4e-4) * pixel ||
-                             (deviations < kSettledStep && step.largest < 0.1 * pixel);
+                             (std::min(deviations, left) < kSettledStep && step.largest < 0.1 * pixel);
         if (level == 0) result_.status = settled ? AlignmentStatus::converged : AlignmentStatus::not_converged;
         if (settled) break;
       }
@@ -341,7 +349,7 @@ class Aligner {
     result_.object_from_camera = problem_.object_from_camera;
     result_.parts = graph_.parts;
     problem_.fixed = fixed_views();
-    match_all(0, gate);
+    if (!uses_all_) match_all(0, gate);  // the scales
     std::vector<PairForm> const forms = match_all(0, std::clamp(5 * scales_.distance, 1.5 * median_pixel(0), gate));
     set_pairs(forms);
     JointSpectrum const spectrum = joint_spectrum(problem_);

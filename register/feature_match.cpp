@@ -102,7 +102,7 @@ Features find_features(RangeImage const& image, ViewSurface const& surface) {
   cv::Mat1b mask(gray.size(), uchar{0});
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x)
-      if (std::isfinite(surface.depth(y, x))) mask(y, x) = 255;
+      if (surface.has_surface(x, y)) mask(y, x) = 255;
   std::vector<cv::KeyPoint> keypoints;
   cv::Ptr<cv::SIFT> const sift = cv::SIFT::create(kMaxFeatures, 3, 0.02);
   sift->detect(gray, keypoints, mask);
@@ -119,8 +119,8 @@ Features find_features(RangeImage const& image, ViewSurface const& surface) {
     double const length = cv::norm(row);
     if (!(length > 0)) continue;
     row /= length;
-    features.points.push_back(surface.camera.unproject(at.x, at.y, surface.depth(y, x)));
-    cv::Vec3f const& n = surface.normal(y, x);
+    features.points.push_back(surface.camera.unproject(at.x, at.y, surface.depth(x, y)));
+    float const* const n = surface.at(x, y).normal;
     features.normals.push_back({n[0], n[1], n[2]});
     features.descriptors.push_back(row);
   }

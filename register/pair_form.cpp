@@ -11,16 +11,40 @@ constexpr double kTukey = 4.685;         // in standard deviations: 95 % efficie
 constexpr double kMinToneCosine = 0.35;  // beyond, the texture is smeared
 constexpr double kMaxCorrelation = 0.8;  // beyond, it is misalignment that neighbours share, not noise
 constexpr double kToneGate = 3.0;        // of `cost`, in scales
+constexpr std::size_t kFigures = 15000;  // residuals of a direction that are kept
 
 double tukey_weight(double residual_in_scales) {
   double const t = residual_in_scales / kTukey;
   return std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
 }
 
+// A symmetric matrix as it is summed up, its upper half only.
+class SymmetricSum {
+ public:
+  void add(double weight, Vector6d const& row) {
+    for (int r = 0, k = 0; r < 6; ++r)
+      for (int c = r; c < 6; ++c, ++k) half_[k] += weight * row[r] * row[c];
+  }
+  // The symmetric part of the product of two rows.
+  void add(double weight, Vector6d const& row, Vector6d const& other) {
+    for (int r = 0, k = 0; r < 6; ++r)
+      for (int c = r; c < 6; ++c, ++k) half_[k] += weight / 2 * (row[r] * other[c] + other[r] * row[c]);
+  }
+  Matrix6d matrix() const {
+    Matrix6d whole;
+    for (int r = 0, k = 0; r < 6; ++r)
+      for (int c = r; c < 6; ++c, ++k) whole(r, c) = whole(c, r) = half_[k];
+    return whole;
+  }
+
+ private:
+  double half_[21] = {};
+};
+
 // One view's contributions to the form, as they are summed up sample by sample.
 struct Sums {
-  Matrix6d shape = Matrix6d::Zero(), tone = Matrix6d::Zero();
-  Matrix6d shape_of_both = Matrix6d::Zero();  // one normal from each view: unbiased by their noise
+  SymmetricSum shape, tone;
+  SymmetricSum shape_of_both;  // one normal from each view: unbiased by their noise
   Vector6d shape_gradient = Vector6d::Zero(), tone_gradient = Vector6d::Zero();
   double shape_weight = 0, normal_difference = 0, matched = 0;
   double cost = 0, cost_samples = 0;
@@ -61,12 +85,16 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
       forward ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : Eigen::Matrix3d(b_from_a.linear());
   bool const use_tone = options.use == MatchOptions::Use::shape_and_tone && !from.tone.empty() && !to.tone.empty();
   SampleGrid const grid(from, options.max_samples);
+  bool const is_dense = grid.pitch() == 1;
   double const sign = forward ? 1 : -1;
+  double const spread = options.geometry_scale * options.geometry_scale;
+  // Scales need not be measured on all.
+  std::size_t const noted = std::max<std::size_t>(1, from.samples.size() / kFigures);
   double last_shape = 0, last_tone = 0;
   SurfaceSample const* last = nullptr;
   bool last_has_tone = false;
   for (SurfaceSample const& sample : from.samples) {
-    if (!grid.contains(sample) || sample.crease) continue;
+    if (sample.crease || !(is_dense || grid.contains(sample))) continue;
     ++asked;
     sums.cost_samples += 1;
     sums.cost += 1;
@@ -76,42 +104,44 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
     Eigen::Vector3d const normal_from = to_from_from.linear() * sample.normal;
     if (hit.crease || normal_from.dot(hit.normal) < options.min_normal_cos) continue;
     double const distance = hit.normal.dot(p - hit.point);
-    Eigen::Vector3d const ray = to.camera.ray_direction(hit.pixel.x(), hit.pixel.y()).normalized();
-    double const cosine = -hit.normal.dot(ray);
+    double const cosine = hit.cosine(to.camera);
     if (cosine < 0.05 || std::abs(distance) > options.gate * cosine) continue;
     ++hits;
 
-    double const cosine_from = -sample.normal.dot(from.camera.ray_direction(sample.x, sample.y).normalized());
-    double const noise_from = sample.sigma * cosine_from, noise_to = hit.sigma * cosine;
+    double const noise_from = sample.sigma * sample.cosine, noise_to = hit.sigma * cosine;
     double const floor = 0.02 * to.camera.pixel_size(hit.point.z());
-    double const sigma = std::sqrt(noise_from * noise_from + noise_to * noise_to + floor * floor);
-    double const in_sigmas = distance / sigma;
-    form.geometry.values.push_back(static_cast<float>(in_sigmas));
-    form.distances.push_back(static_cast<float>(distance));
+    double const variance = noise_from * noise_from + noise_to * noise_to + floor * floor;
+    double const in_sigmas = distance / std::sqrt(variance);
+    if (hits % noted == 0) {
+      form.geometry.values.push_back(static_cast<float>(in_sigmas));
+      form.distances.push_back(static_cast<float>(distance));
+    }
 
     // The sample's place in b's frame, where motions are measured.
     Eigen::Vector3d const arm = (forward ? p : sample.point) - form.center;
     Vector6d const row = sign * row_of(arm, b_from_to * hit.normal, options.radius);
     Vector6d const row_other = sign * row_of(arm, b_from_to * normal_from, options.radius);
     double const scaled = in_sigmas / options.geometry_scale;
-    double const weight = tukey_weight(scaled) * options.geometry_share / std::pow(sigma * options.geometry_scale, 2);
-    sums.shape += weight * row * row.transpose();
-    sums.shape_of_both += weight / 2 * (row * row_other.transpose() + row_other * row.transpose());
+    double const weight = tukey_weight(scaled) * options.geometry_share / (variance * spread);
+    sums.shape.add(weight, row);
+    sums.shape_of_both.add(weight, row, row_other);
     sums.shape_gradient += weight * distance * row;
     sums.shape_weight += weight;
     sums.normal_difference += (normal_from - hit.normal).squaredNorm();
     sums.matched += 1;
-    double cost = std::min(1.0, std::pow(distance / (options.gate * cosine), 2));
+    double const of_gate = distance / (options.gate * cosine);
+    double cost = std::min(1.0, of_gate * of_gate);
 
+    double const bounded = std::clamp(scaled, -3.0, 3.0);
     bool const adjacent = last != nullptr && last->y == sample.y && sample.x - last->x == grid.pitch();
     if (adjacent) {
-      form.geometry.product += std::clamp(scaled, -3.0, 3.0) * last_shape;
-      form.geometry.square += (std::pow(std::clamp(scaled, -3.0, 3.0), 2) + last_shape * last_shape) / 2;
+      form.geometry.product += bounded * last_shape;
+      form.geometry.square += (bounded * bounded + last_shape * last_shape) / 2;
     }
-    last_shape = std::clamp(scaled, -3.0, 3.0);
+    last_shape = bounded;
 
     bool has_tone = false;
-    if (use_tone && std::isfinite(sample.tone) && std::min(cosine, cosine_from) > kMinToneCosine) {
+    if (use_tone && std::isfinite(sample.tone) && std::min<double>(cosine, sample.cosine) > kMinToneCosine) {
       float const tone_to = bilinear(to.tone, hit.pixel);
       cv::Vec2f const slope = bilinear(to.tone_gradient, hit.pixel);
       if (std::isfinite(tone_to) && std::isfinite(slope[0]) && std::isfinite(slope[1])) {
@@ -124,7 +154,7 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
         double const tone_scaled = difference / options.tone_scale;
         double const tone_weight =
             tukey_weight(tone_scaled) * options.tone_share / (options.tone_scale * options.tone_scale);
-        sums.tone += tone_weight * tone_row * tone_row.transpose();
+        sums.tone.add(tone_weight, tone_row);
         sums.tone_gradient += tone_weight * difference * tone_row;
         sums.tone_aa += sample.tone * sample.tone;
         sums.tone_bb += tone_to * tone_to;
@@ -143,25 +173,26 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
   }
 }
 
-// Takes out the motions that the shapes do not constrain beyond the noise of their normals. Returns how many.
+// The information and the gradient of the shapes without the motions that they do not constrain beyond the noise of
+// their normals. Returns how many. With one normal from each view, noise neither holds a motion nor shortens a step.
 int hold_free_motions(Sums const& sums, Matrix6d& information, Vector6d& gradient) {
-  if (!(sums.shape_weight > 0)) return 6;
-  Eigen::SelfAdjointEigenSolver<Matrix6d> const spectrum(sums.shape_of_both / sums.shape_weight);
+  Eigen::SelfAdjointEigenSolver<Matrix6d> const spectrum(sums.shape_of_both.matrix() / sums.shape_weight);
   double const normal_variance = sums.normal_difference / sums.matched / 4;  // an axis of one view's normals
   double const independent = std::max(1.0, sums.matched / 25);               // windows overlap
   double const noise = 4 * normal_variance / std::sqrt(independent);
   double const threshold = std::max(1e-5, noise);
   // A motion comes in gradually above the threshold, so that two linearisations do not take turns.
-  Matrix6d root = Matrix6d::Zero(), share = Matrix6d::Zero();
+  Matrix6d held_information = Matrix6d::Zero(), share = Matrix6d::Zero();
   int held = 0;
   for (int k = 0; k < 6; ++k) {
-    double const trust = std::clamp(spectrum.eigenvalues()[k] / threshold - 1, 0.0, 2.0) / 2;
+    double const value = spectrum.eigenvalues()[k];
+    double const trust = std::clamp(value / threshold - 1, 0.0, 2.0) / 2;
     if (trust == 0) ++held;
     Matrix6d const outer = spectrum.eigenvectors().col(k) * spectrum.eigenvectors().col(k).transpose();
-    root += std::sqrt(trust) * outer;
+    held_information += trust * sums.shape_weight * std::max(0.0, value) * outer;
     share += trust * outer;
   }
-  information = root * information * root;
+  information = held_information;
   gradient = share * gradient;
   return held;
 }
@@ -194,19 +225,33 @@ double motion_difference(Eigen::Isometry3d const& l, Eigen::Isometry3d const& r,
 }
 
 bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p, SurfaceHit& hit) {
-  if (surface.camera.is_perspective() && !(p.z() > 0)) return false;
-  hit.pixel = surface.camera.project(p);
-  if (!(hit.pixel.x() >= 0 && hit.pixel.y() >= 0 && hit.pixel.x() <= surface.depth.cols - 1 &&
-        hit.pixel.y() <= surface.depth.rows - 1))
-    return false;
-  float const z = bilinear(surface.depth, hit.pixel);
-  if (!std::isfinite(z)) return false;
-  cv::Vec3f const n = bilinear(surface.normal, hit.pixel);
-  hit.normal = Eigen::Vector3d(n[0], n[1], n[2]).normalized();
-  hit.point = surface.camera.unproject(hit.pixel.x(), hit.pixel.y(), z);
-  int const x = static_cast<int>(std::lround(hit.pixel.x())), y = static_cast<int>(std::lround(hit.pixel.y()));
-  hit.sigma = surface.sigma(y, x);
-  hit.crease = surface.crease(y, x) != 0;
+  Camera const& camera = surface.camera;
+  bool const inverse = camera.is_perspective();
+  if (inverse && !(p.z() > 0)) return false;
+  double const scale = inverse ? 1 / p.z() : 1;
+  double const u = camera.fx() * p.x() * scale + camera.cx(), v = camera.fy() * p.y() * scale + camera.cy();
+  int const width = camera.width(), height = camera.height();
+  if (!(u >= 0 && v >= 0 && u <= width - 1 && v <= height - 1)) return false;
+  int const x = static_cast<int>(u), y = static_cast<int>(v);
+  float const s = static_cast<float>(u - x), t = static_cast<float>(v - y);
+  std::size_t const right = x + 1 < width ? 1 : 0, down = y + 1 < height ? static_cast<std::size_t>(width) : 0;
+  SurfacePixel const* const p00 = &surface.at(x, y);
+  SurfacePixel const &p10 = p00[right], &p01 = p00[down], &p11 = p00[down + right];
+  float const w00 = (1 - s) * (1 - t), w10 = s * (1 - t), w01 = (1 - s) * t, w11 = s * t;
+  double const chord = static_cast<double>(w00) * p00->linear_depth + static_cast<double>(w10) * p10.linear_depth +
+                       static_cast<double>(w01) * p01.linear_depth + static_cast<double>(w11) * p11.linear_depth;
+  if (!std::isfinite(chord)) return false;
+  SurfacePixel const& nearest = p00[(s >= 0.5f ? right : 0) + (t >= 0.5f ? down : 0)];
+  double const linear = chord - (s * (1 - s) * nearest.bend_u + t * (1 - t) * nearest.bend_v) / 2;
+  Eigen::Vector3d n;
+  for (int k = 0; k < 3; ++k)
+    n[k] = w00 * p00->normal[k] + w10 * p10.normal[k] + w01 * p01.normal[k] + w11 * p11.normal[k];
+  hit.normal = n / n.norm();
+  hit.pixel = {u, v};
+  double const z = inverse ? 1 / linear : linear, of_ray = inverse ? z : 1;
+  hit.point = {(u - camera.cx()) / camera.fx() * of_ray, (v - camera.cy()) / camera.fy() * of_ray, z};
+  hit.sigma = nearest.sigma;
+  hit.crease = nearest.crease;
   return true;
 }
 
@@ -230,9 +275,12 @@ PairForm match_pair(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3
   Sums sums;
   match_one_way(a, b, b_from_a, true, options, form, sums, form.asked_ab, form.hits_ab);
   match_one_way(b, a, b_from_a, false, options, form, sums, form.asked_ba, form.hits_ba);
+  // Where every pixel is taken into the other view and every pixel there comes back, each one's noise counts twice.
+  bool const is_dense =
+      SampleGrid(a, options.max_samples).pitch() == 1 && SampleGrid(b, options.max_samples).pitch() == 1;
   form.cost = sums.cost_samples > 0 ? sums.cost / sums.cost_samples : 1;
-  if (sums.matched > 0) {
-    form.information = sums.shape;
+  if (sums.matched > 0 && sums.shape_weight > 0) {
+    form.information = sums.shape.matrix();
     form.gradient = sums.shape_gradient;
     if (options.hold_free_motions) form.held = hold_free_motions(sums, form.information, form.gradient);
   } else {
@@ -243,35 +291,30 @@ PairForm match_pair(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3
   // Tones that do not resemble each other say nothing, however strong their gradients: noise, or another surface.
   double const trust = std::clamp((form.tone_correlation - 0.2) / 0.3, 0.0, 1.0);
   if (trust > 0) {
-    form.information += trust * sums.tone;
+    form.information += trust * sums.tone.matrix();
     form.gradient += trust * sums.tone_gradient;
     if (form.held < 6) form.held = 0;
+  }
+  if (is_dense) {
+    form.information /= 2;
+    form.gradient /= 2;
   }
   return form;
 }
 
-PairOverlap measure_overlap(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3d const& b_from_a,
-                            MatchOptions const& options) {
-  auto const one_way = [&](ViewSurface const& from, ViewSurface const& to, Eigen::Isometry3d const& to_from_from,
-                           std::size_t& hits) {
-    SampleGrid const grid(from, options.max_samples);
-    std::size_t asked = 0, met = 0;
-    for (SurfaceSample const& sample : from.samples) {
-      if (!grid.contains(sample)) continue;
-      ++asked;
-      SurfaceHit hit;
-      Eigen::Vector3d const p = to_from_from * sample.point;
-      if (!look_up(to, p, hit)) continue;
-      if ((to_from_from.linear() * sample.normal).dot(hit.normal) < options.min_normal_cos) continue;
-      if (std::abs(p.z() - hit.point.z()) <= options.gate) ++met;
-    }
-    hits += met;
-    return asked > 0 ? static_cast<double>(met) / static_cast<double>(asked) : 0.0;
-  };
-  PairOverlap overlap;
-  overlap.ab = one_way(a, b, b_from_a, overlap.hits);
-  overlap.ba = one_way(b, a, b_from_a.inverse(), overlap.hits);
-  return overlap;
+std::vector<bool> seen_samples(ViewSurface const& from, ViewSurface const& to, Eigen::Isometry3d const& to_from_from,
+                               MatchOptions const& options) {
+  SampleGrid const grid(from, options.max_samples);
+  std::vector<bool> seen;
+  for (SurfaceSample const& sample : from.samples) {
+    if (!grid.contains(sample)) continue;
+    SurfaceHit hit;
+    Eigen::Vector3d const p = to_from_from * sample.point;
+    seen.push_back(look_up(to, p, hit) &&
+                   (to_from_from.linear() * sample.normal).dot(hit.normal) >= options.min_normal_cos &&
+                   std::abs(p.z() - hit.point.z()) <= options.gate);
+  }
+  return seen;
 }
 
 }  // namespace scanview

@@ -67,13 +67,10 @@ struct PairForm {
 PairForm match_pair(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3d const& b_from_a,
                     Eigen::Vector3d const& centroid_a, Eigen::Vector3d const& centroid_b, MatchOptions const& options);
 
-/// Shares of the samples of a that b sees, and of b that a sees.
-struct PairOverlap {
-  double ab = 0, ba = 0;
-  std::size_t hits = 0;
-};
-PairOverlap measure_overlap(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3d const& b_from_a,
-                            MatchOptions const& options);
+/// Which of the samples of `from` (those of its grid for `max_samples`, in order) `to` sees: within the gate along its
+/// depth, facing alike.
+std::vector<bool> seen_samples(ViewSurface const& from, ViewSurface const& to, Eigen::Isometry3d const& to_from_from,
+                               MatchOptions const& options);
 
 /// Median absolute deviation from zero, scaled to a standard deviation of a normal distribution. Reorders the values.
 double robust_scale(std::vector<float>& values);
@@ -81,12 +78,17 @@ double robust_scale(std::vector<float>& values);
 /// ((1 - c)/(1 + c))^2, of a separable autoregressive field.
 double effective_share(double correlation);
 
-/// The surface of a view where a point falls: bilinear depth and normal.
+/// The surface of a view where a point falls: bilinear normal, and linear depth between the pixels as it is where the
+/// surface bends evenly (chords cut curvature off, on both views' slanted sides, and pull the views together).
 struct SurfaceHit {
   Eigen::Vector3d point, normal;
   Eigen::Vector2d pixel;
   double sigma = 0;
   bool crease = false;
+  /// Of the angle between the ray and the normal.
+  double cosine(Camera const& camera) const {
+    return camera.is_perspective() ? -normal.dot(point) / point.norm() : -normal.z();
+  }
 };
 /// False where the point falls outside or on no surface.
 bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p_camera, SurfaceHit& hit);

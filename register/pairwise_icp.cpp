@@ -29,8 +29,8 @@ bool is_edge(ViewSurface const& surface, SurfaceSample const& sample, int pitch)
   int const reach = std::max(2, pitch);
   for (auto const& [dx, dy] : {std::pair{-reach, 0}, {reach, 0}, {0, -reach}, {0, reach}}) {
     int const x = sample.x + dx, y = sample.y + dy;
-    if (x < 0 || y < 0 || x >= surface.depth.cols || y >= surface.depth.rows) return true;
-    if (!std::isfinite(surface.depth(y, x))) return true;
+    if (x < 0 || y < 0 || x >= surface.camera.width() || y >= surface.camera.height()) return true;
+    if (!surface.has_surface(x, y)) return true;
   }
   return false;
 }

@@ -59,8 +59,28 @@ struct Measured {
   double cost = 1;
 };
 
-Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features const& features_a,
-                      Features const& features_b, Eigen::Isometry3d const& start, ViewGraphEdge const& edge,
+// How firmly shape and tone hold a pair where it was found, as a mean form, so that strong and weak pairs differ by
+// direction, not by the number of their pixels.
+Measured measured_at(SurfacePyramid const& a, SurfacePyramid const& b, ViewGraphEdge const& edge, bool is_firm,
+                     Eigen::Isometry3d const& b_from_a, double radius) {
+  PairMeasurement pair{edge.a, edge.b, b_from_a, Matrix6d::Zero(), Vector6d::Zero(), Eigen::Vector3d::Zero()};
+  MatchOptions options = cost_options(radius);
+  options.hold_free_motions = false;  // else the way there would be held as well
+  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options);
+  pair.center = form.center;
+  double const trace = form.information.trace();
+  if (trace > 0 && form.hits_ab + form.hits_ba >= 30)
+    pair.information = form.information * (6 / trace) / std::pow(kPairAccuracy * radius, 2);
+  return {pair, is_firm, form.cost};
+}
+
+// What may lie near a start that the views contradict.
+struct ViewFeatures {
+  Features color, shape;
+};
+
+Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, ViewFeatures const& of_a,
+                      ViewFeatures const& of_b, Eigen::Isometry3d const& start, ViewGraphEdge const& edge,
                       double radius, double reach, std::uint64_t seed, std::size_t views) {
   MatchOptions const options = cost_options(radius);
   std::vector<Eigen::Isometry3d> candidates{start};
@@ -72,7 +92,7 @@ Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features
   feature_options.threshold = 0.02 * radius;
   feature_options.seed = seed;
   feature_options.item = edge.a * views + edge.b;
-  FeatureMotion const by_features = match_features(features_a, features_b, feature_options);
+  FeatureMotion const by_features = match_features(of_a.color, of_b.color, feature_options);
   if (by_features.found) {
     candidates.push_back(by_features.b_from_a);
     icp.first_distance = 0.1;
@@ -80,41 +100,28 @@ Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features
   }
   std::size_t const plain = candidates.size();
   for (std::size_t k = 0; k < plain; ++k) candidates.push_back(polish(a, b, candidates[k], options));
-  PairMeasurement best{edge.a, edge.b, start, Matrix6d::Zero(), Vector6d::Zero(), Eigen::Vector3d::Zero()};
+  Eigen::Isometry3d best = start;
   double least = 2;
   for (Eigen::Isometry3d const& candidate : candidates) {
     double const cost = cost_at(a, b, candidate, options);
     if (cost >= least) continue;
     least = cost;
-    best.b_from_a = candidate;
+    best = candidate;
   }
   // Far off, each of these may have stopped at a wrong place.
   PairSearchOptions search;
   search.radius = radius;
-  PairPose found = search_pair(a, b, {}, {best.b_from_a}, search);
+  PairPose found = search_pair(a, b, {}, {best}, search);
   if (found.verdict != PairPose::Verdict::firm) {
-    ShapeFeatureOptions shape;
-    shape.radius = radius;
-    Features const shape_a = find_shape_features(level_of(a, 1), shape),
-                   shape_b = find_shape_features(level_of(b, 1), shape);
-    found = search_pair(a, b, {{&shape_a, &shape_b}, {&features_a, &features_b}}, {best.b_from_a}, search);
+    found = search_pair(a, b, {{&of_a.shape, &of_b.shape}, {&of_a.color, &of_b.color}}, {best}, search);
     // What was told of the poses counts more than what a shape with symmetries looks like.
     bool const within = motion_difference(found.b_from_a, start, a.centroid, radius) < reach;
     if (!within) found.verdict = PairPose::Verdict::refused;
-    if (found.verdict == PairPose::Verdict::firm) best.b_from_a = found.b_from_a;
+    if (found.verdict == PairPose::Verdict::firm) best = found.b_from_a;
   } else if (cost_at(a, b, found.b_from_a, options) < least) {
-    best.b_from_a = found.b_from_a;
+    best = found.b_from_a;
   }
-  // How firmly shape and tone hold it there, as a mean form, so that strong and weak pairs differ by direction, not by
-  // the number of their pixels.
-  MatchOptions held = options;
-  held.hold_free_motions = false;  // else the way there would be held as well
-  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), best.b_from_a, a.centroid, b.centroid, held);
-  best.center = form.center;
-  double const trace = form.information.trace();
-  if (trace > 0 && form.hits_ab + form.hits_ba >= 30)
-    best.information = form.information * (6 / trace) / std::pow(kPairAccuracy * radius, 2);
-  return {best, found.verdict == PairPose::Verdict::firm, form.cost};
+  return measured_at(a, b, edge, found.verdict == PairPose::Verdict::firm, best, radius);
 }
 
 }  // namespace
@@ -136,23 +143,40 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
                                                 std::vector<ViewGraphEdge> const& edges, JointProblem const& start,
                                                 Context& context) {
   std::size_t const n = views.size();
-  std::vector<Features> features(n);
-  for_each_index(context, n, [&](std::size_t i) {
-    if (views[i].depths > 0 && !views[i].levels[0].tone.empty())
-      features[i] = find_features(set.views[i].image, views[i].levels[0]);
-  });
   JointProblem problem = start;
   double const reach =
       start.belief_std > 0 ? kMostDeviations * start.belief_std : std::numeric_limits<double>::infinity();
+  auto const start_of = [&](ViewGraphEdge const& edge) {
+    return Eigen::Isometry3d(start.object_from_camera[edge.b].inverse() * start.object_from_camera[edge.a]);
+  };
   std::vector<Measured> measured(edges.size());
+  // Most starts need no search.
+  for_each_index(context, edges.size(), [&](std::size_t e) {
+    SurfacePyramid const &a = views[edges[e].a], &b = views[edges[e].b];
+    PairSearchOptions search;
+    search.radius = problem.radius;
+    PairPose const near = search_pair(a, b, {}, {start_of(edges[e])}, search);
+    if (near.verdict == PairPose::Verdict::firm)
+      measured[e] = measured_at(a, b, edges[e], true, near.b_from_a, problem.radius);
+  });
+  std::vector<ViewFeatures> features(n);
+  std::vector<bool> is_needed(n, false);
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (!measured[e].is_firm) is_needed[edges[e].a] = is_needed[edges[e].b] = true;
+  for_each_index(context, n, [&](std::size_t i) {
+    if (!is_needed[i] || views[i].depths == 0) return;
+    ShapeFeatureOptions shape;
+    shape.radius = problem.radius;
+    features[i].shape = find_shape_features(level_of(views[i], 1), shape);
+    if (!views[i].levels[0].tone.empty()) features[i].color = find_features(set.views[i].image, views[i].levels[0]);
+  });
   for_each_index(
       context, edges.size(),
       [&](std::size_t e) {
         ViewGraphEdge const& edge = edges[e];
-        Eigen::Isometry3d const b_from_a =
-            start.object_from_camera[edge.b].inverse() * start.object_from_camera[edge.a];
-        measured[e] = measure_pair(views[edge.a], views[edge.b], features[edge.a], features[edge.b], b_from_a, edge,
-                                   problem.radius, reach, context.seed, n);
+        if (!measured[e].is_firm)
+          measured[e] = measure_pair(views[edge.a], views[edge.b], features[edge.a], features[edge.b], start_of(edge),
+                                     edge, problem.radius, reach, context.seed, n);
       },
       "register: pairs");
   problem.pairs.clear();

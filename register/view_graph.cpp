@@ -45,17 +45,40 @@ ViewGraph build_view_graph(std::vector<ViewSurface const*> const& surfaces,
                            std::vector<Eigen::Isometry3d> const& object_from_camera, double min_overlap,
                            MatchOptions const& options, Context& context) {
   std::size_t const n = surfaces.size();
-  std::vector<std::vector<ViewGraphEdge>> rows(n);
+  struct OneWay {
+    std::size_t hits = 0;
+    double overlap = 0, independent = 0;  // sum over the hits
+  };
+  std::vector<std::vector<OneWay>> rows(n, std::vector<OneWay>(n));
   for_each_index(context, n, [&](std::size_t a) {
-    for (std::size_t b = a + 1; b < n; ++b) {
+    std::vector<std::vector<bool>> seen(n);
+    std::vector<std::size_t> views;  // that see a sample, this one among them
+    for (std::size_t b = 0; b < n; ++b) {
+      if (b == a) continue;
       Eigen::Isometry3d const b_from_a = object_from_camera[b].inverse() * object_from_camera[a];
-      PairOverlap const overlap = measure_overlap(*surfaces[a], *surfaces[b], b_from_a, options);
-      if (overlap.hits >= 12 && std::max(overlap.ab, overlap.ba) >= min_overlap)
-        rows[a].push_back({a, b, overlap.ab, overlap.ba});
+      seen[b] = seen_samples(*surfaces[a], *surfaces[b], b_from_a, options);
+      views.resize(seen[b].size(), 1);
+      for (std::size_t k = 0; k < seen[b].size(); ++k) views[k] += seen[b][k] ? 1 : 0;
+    }
+    for (std::size_t b = 0; b < n; ++b) {
+      OneWay& to = rows[a][b];
+      for (std::size_t k = 0; k < seen[b].size(); ++k)
+        if (seen[b][k]) {
+          ++to.hits;
+          to.independent += 2.0 / static_cast<double>(views[k]);
+        }
+      if (!seen[b].empty()) to.overlap = static_cast<double>(to.hits) / static_cast<double>(seen[b].size());
     }
   });
   ViewGraph graph;
-  for (auto const& row : rows) graph.edges.insert(graph.edges.end(), row.begin(), row.end());
+  for (std::size_t a = 0; a < n; ++a)
+    for (std::size_t b = a + 1; b < n; ++b) {
+      OneWay const &ab = rows[a][b], &ba = rows[b][a];
+      std::size_t const hits = ab.hits + ba.hits;
+      if (hits >= 12 && std::max(ab.overlap, ba.overlap) >= min_overlap)
+        graph.edges.push_back(
+            {a, b, ab.overlap, ba.overlap, (ab.independent + ba.independent) / static_cast<double>(hits)});
+    }
   graph.parts = connected_parts(n, graph.edges);
   return graph;
 }

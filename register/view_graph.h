@@ -12,6 +12,10 @@ namespace scanview {
 struct ViewGraphEdge {
   std::size_t a = 0, b = 0;               ///< a < b
   double overlap_ab = 0, overlap_ba = 0;  ///< share of a's depths that b sees, and the other way
+  /// Of what the pair says, the share that other pairs do not say as well: mean over the common surface of 2/n, where n
+  /// views see it. Their n(n - 1)/2 pairs compare only n noisy surfaces (the sum of all squared differences is n times
+  /// that from the mean).
+  double independent = 1;
 };
 
 /// Which views overlap at given poses. Nothing is assumed about where the cameras stand.

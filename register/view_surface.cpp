@@ -123,63 +123,152 @@ std::optional<double> window_center(Level const& level, int x, int y) {
   return mean;
 }
 
-// `squares`: sum of the squared linear depths of the window less their plane's.
-bool is_crease(Level const& level, double squares, int count, double z, double sigma) {
-  double const misfit = std::sqrt(std::max(0.0, squares) / count) * (level.camera.is_perspective() ? z * z : 1.0);
-  return misfit > std::hypot(2 * sigma, kCreaseMisfit * level.camera.pixel_size(z));
+// Linear depth around a pixel: value + slope_u du + slope_v dv.
+struct Plane {
+  double value = 0, slope_u = 0, slope_v = 0;
+  double sigma = 0;   // mean over the window
+  double misfit = 0;  // RMS, units of z
+};
+
+bool is_crease(Level const& level, Plane const& plane, double z) {
+  return plane.misfit > std::hypot(2 * plane.sigma, kCreaseMisfit * level.camera.pixel_size(z));
 }
 
-void fit_pixel(Level const& level, int radius, int x, int y, ViewSurface& surface) {
-  auto const center = window_center(level, x, y);
-  if (!center) return;
+// A change of linear depth as a change of z.
+double units_of(Camera const& camera, double z) { return camera.is_perspective() ? z * z : 1.0; }
+
+// The surface around one pixel, gathered depth by depth where the window is not whole or holds more than one surface.
+std::optional<Plane> gather_plane(Level const& level, int radius, int x, int y, double center) {
   Camera const& camera = level.camera;
-  double const pixel = camera.pixel_size(*center);
-  Eigen::Matrix3d normal_matrix = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double sigma_sum = 0, squares = 0;
-  int count = 0;
-  double const scale = linear_depth(camera, *center);
+  double const step = kMaxSlope * camera.pixel_size(center), scale = linear_depth(camera, center);
+  double n = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0, sl = 0, sul = 0, svl = 0, sll = 0, sigma_sum = 0;
   for (int v = std::max(0, y - radius); v <= std::min(level.depth.rows - 1, y + radius); ++v)
     for (int u = std::max(0, x - radius); u <= std::min(level.depth.cols - 1, x + radius); ++u) {
       float const z = level.depth(v, u);
       if (!std::isfinite(z)) continue;
-      int const du = u - x, dv = v - y;
-      double const reach = kMaxSlope * pixel * std::max({1, std::abs(du), std::abs(dv)});
-      if (std::abs(z - *center) > reach + 4 * level.sigma(v, u)) continue;
-      Eigen::Vector3d const row(1, du, dv);
-      normal_matrix += row * row.transpose();
-      double const difference = linear_depth(camera, z) - scale;
-      right += row * difference;
-      squares += difference * difference;
+      double const du = u - x, dv = v - y;
+      double const reach = step * std::max({1.0, std::abs(du), std::abs(dv)});
+      if (std::abs(z - center) > reach + 4 * level.sigma(v, u)) continue;
+      double const l = linear_depth(camera, z) - scale;
+      n += 1, su += du, sv += dv, suu += du * du, suv += du * dv, svv += dv * dv;
+      sl += l, sul += du * l, svl += dv * l, sll += l * l;
       sigma_sum += level.sigma(v, u);
-      ++count;
     }
   int const full = (2 * radius + 1) * (2 * radius + 1);
-  if (count < std::max(6, full * 3 / 10)) return;
-  double const off_center = std::hypot(normal_matrix(0, 1), normal_matrix(0, 2)) / count;
-  if (off_center > 0.26 * radius) return;
+  if (n < std::max(6, full * 3 / 10)) return std::nullopt;
+  if (std::hypot(su, sv) / n > 0.26 * radius) return std::nullopt;
+  Eigen::Matrix3d normal_matrix;
+  normal_matrix << n, su, sv, su, suu, suv, sv, suv, svv;
+  Eigen::Vector3d const right(sl, sul, svl);
   Eigen::LDLT<Eigen::Matrix3d> const solver(normal_matrix);
-  if (solver.vectorD().minCoeff() < 1e-6 * count) return;
+  if (solver.vectorD().minCoeff() < 1e-6 * n) return std::nullopt;
   Eigen::Vector3d const plane = solver.solve(right);
-  double const at_pixel = plane[0] + scale;
-  double const z = linear_depth(camera, at_pixel);
-  if (!std::isfinite(z) || (camera.is_perspective() && z <= 0)) return;
+  double const rest = std::sqrt(std::max(0.0, sll - plane.dot(right)) / n) * units_of(camera, center);
+  return Plane{plane[0] + scale, plane[1], plane[2], sigma_sum / n, rest};
+}
+
+// Sums over whole windows of every pixel, rows first, then columns; NaN where a depth of the window is missing.
+class WindowSums {
+ public:
+  WindowSums(Level const& level, int radius) : level_(level), radius_(radius), rows_(2 * radius + 1) {
+    for (Row& row : rows_)
+      for (auto* const sum : {&row.l, &row.ul, &row.ll, &row.sigma})
+        sum->assign(static_cast<std::size_t>(level.depth.cols), kMissing);
+    for (auto* const sum : {&l_, &ul_, &vl_, &ll_, &sigma_}) sum->resize(static_cast<std::size_t>(level.depth.cols));
+  }
+
+  /// Rows must come in order from 0.
+  void go_to_row(int y) {
+    for (; next_ <= std::min(y + radius_, level_.depth.rows - 1); ++next_) add_row(next_);
+    std::size_t const width = l_.size();
+    for (auto* const sum : {&l_, &ul_, &vl_, &ll_, &sigma_}) std::fill(sum->begin(), sum->end(), 0.0);
+    is_whole_ = y >= radius_ && y + radius_ < level_.depth.rows;
+    if (!is_whole_) return;
+    for (int dv = -radius_; dv <= radius_; ++dv) {
+      Row const& row = row_of(y + dv);
+      double const factor = dv;
+      for (std::size_t x = 0; x < width; ++x) {
+        l_[x] += row.l[x];
+        ul_[x] += row.ul[x];
+        vl_[x] += factor * row.l[x];
+        ll_[x] += row.ll[x];
+        sigma_[x] += row.sigma[x];
+      }
+    }
+  }
+
+  /// Of the row gone to last; nothing where the window is not whole.
+  std::optional<Plane> plane(int x, double z) const {
+    auto const at = static_cast<std::size_t>(x);
+    if (!is_whole_ || !std::isfinite(l_[at])) return std::nullopt;
+    double const side = 2 * radius_ + 1, count = side * side, squares = count * (radius_ * (radius_ + 1.0)) / 3;
+    double const mean = l_[at] / count, slope_u = ul_[at] / squares, slope_v = vl_[at] / squares;
+    double const rest = ll_[at] - count * mean * mean - squares * (slope_u * slope_u + slope_v * slope_v);
+    return Plane{mean, slope_u, slope_v, sigma_[at] / count,
+                 std::sqrt(std::max(0.0, rest) / count) * units_of(level_.camera, z)};
+  }
+
+ private:
+  struct Row {
+    std::vector<double> l, ul, ll, sigma;
+  };
+  Row& row_of(int y) { return rows_[static_cast<std::size_t>(y % (2 * radius_ + 1))]; }
+
+  void add_row(int y) {
+    int const width = level_.depth.cols;
+    linear_.resize(static_cast<std::size_t>(width));
+    float const* const depth = level_.depth.ptr<float>(y);
+    float const* const noise = level_.sigma.ptr<float>(y);
+    bool const inverse = level_.camera.is_perspective();
+    for (int x = 0; x < width; ++x) linear_[static_cast<std::size_t>(x)] = inverse ? 1.0 / depth[x] : depth[x];
+    Row& row = row_of(y);
+    for (auto* const sum : {&row.l, &row.ul, &row.ll, &row.sigma}) std::fill(sum->begin(), sum->end(), 0.0);
+    std::fill(row.l.begin(), row.l.begin() + std::min(radius_, width), kMissing);
+    std::fill(row.l.end() - std::min(radius_, width), row.l.end(), kMissing);
+    for (int du = -radius_; du <= radius_; ++du) {
+      double const factor = du;
+      double const* const l = linear_.data() + du;
+      float const* const s = noise + du;
+      double *const sl = row.l.data(), *const sul = row.ul.data(), *const sll = row.ll.data(),
+                    *const ss = row.sigma.data();
+      for (int x = radius_; x < width - radius_; ++x) {
+        sl[x] += l[x];
+        sul[x] += factor * l[x];
+        sll[x] += l[x] * l[x];
+        ss[x] += s[x];
+      }
+    }
+  }
+
+  Level const& level_;
+  int radius_;
+  std::vector<Row> rows_;
+  std::vector<double> linear_;
+  std::vector<double> l_, ul_, vl_, ll_, sigma_;
+  int next_ = 0;
+  bool is_whole_ = false;
+};
+
+bool set_pixel(Level const& level, Plane const& plane, int x, int y, SurfacePixel& pixel) {
+  Camera const& camera = level.camera;
+  if (!std::isfinite(plane.value) || (camera.is_perspective() && plane.value <= 0)) return false;
+  Eigen::Vector3d const ray = camera.ray_direction(x, y);
   Eigen::Vector3d normal;
   if (camera.is_perspective())
-    normal = -Eigen::Vector3d(plane[1] * camera.fx(), plane[2] * camera.fy(),
-                              at_pixel + plane[1] * (camera.cx() - x) + plane[2] * (camera.cy() - y));
+    normal = -Eigen::Vector3d(plane.slope_u * camera.fx(), plane.slope_v * camera.fy(),
+                              plane.value + plane.slope_u * (camera.cx() - x) + plane.slope_v * (camera.cy() - y));
   else
-    normal = Eigen::Vector3d(plane[1] * camera.fx(), plane[2] * camera.fy(), -1);
+    normal = Eigen::Vector3d(plane.slope_u * camera.fx(), plane.slope_v * camera.fy(), -1);
   normal.normalize();
-  if (-normal.dot(camera.ray_direction(x, y).normalized()) < kMinCosine) return;
+  if (-normal.dot(ray) < kMinCosine * ray.norm()) return false;
   // The plane is right about direction, but cuts off curvature, the more so the more a view sees at a slant: that would
   // pull views together. So depths stay as they were measured, and the plane only fills holes.
   float const own = level.depth(y, x);
-  surface.depth(y, x) = std::isfinite(own) ? own : static_cast<float>(z);
-  surface.normal(y, x) =
-      cv::Vec3f(static_cast<float>(normal.x()), static_cast<float>(normal.y()), static_cast<float>(normal.z()));
-  surface.sigma(y, x) = static_cast<float>(sigma_sum / count);
-  if (is_crease(level, squares - plane.dot(right), count, z, sigma_sum / count)) surface.crease(y, x) = 255;
+  pixel.linear_depth = static_cast<float>(std::isfinite(own) ? linear_depth(camera, own) : plane.value);
+  for (int k = 0; k < 3; ++k) pixel.normal[k] = static_cast<float>(normal[k]);
+  pixel.sigma = static_cast<float>(plane.sigma);
+  pixel.crease = is_crease(level, plane, linear_depth(camera, plane.value));
+  return true;
 }
 
 void add_tone(Level const& level, ViewSurface& surface) {
@@ -187,7 +276,7 @@ void add_tone(Level const& level, ViewSurface& surface) {
   cv::Mat1f inside(size, 0.0f), masked(size, 0.0f);
   for (int y = 0; y < size.height; ++y)
     for (int x = 0; x < size.width; ++x)
-      if (std::isfinite(level.depth(y, x)) || std::isfinite(surface.depth(y, x))) {
+      if (std::isfinite(level.depth(y, x)) || surface.has_surface(x, y)) {
         inside(y, x) = 1;
         masked(y, x) = level.brightness(y, x);
       }
@@ -208,34 +297,77 @@ void add_tone(Level const& level, ViewSurface& surface) {
 }
 
 void gather_samples(Level const& level, std::size_t max_samples, ViewSurface& surface) {
-  std::size_t const count = static_cast<std::size_t>(cv::countNonZero(surface.depth == surface.depth));
+  std::size_t const count = static_cast<std::size_t>(std::count_if(
+      surface.pixels.begin(), surface.pixels.end(), [](SurfacePixel const& pixel) { return pixel.has_surface(); }));
   surface.stride = 1;
   while (count / static_cast<std::size_t>(surface.stride * surface.stride) > max_samples) ++surface.stride;
-  for (int y = 0; y < surface.depth.rows; y += surface.stride)
-    for (int x = 0; x < surface.depth.cols; x += surface.stride) {
-      float const z = surface.depth(y, x);
-      if (!std::isfinite(z) || !std::isfinite(level.depth(y, x))) continue;
-      cv::Vec3f const& n = surface.normal(y, x);
-      SurfaceSample sample{surface.camera.unproject(x, y, z), {n[0], n[1], n[2]}, surface.sigma(y, x), nan_f(), x, y,
-                           surface.crease(y, x) != 0};
+  surface.samples.reserve(count / static_cast<std::size_t>(surface.stride * surface.stride));
+  for (int y = 0; y < level.depth.rows; y += surface.stride)
+    for (int x = 0; x < level.depth.cols; x += surface.stride) {
+      SurfacePixel const& pixel = surface.at(x, y);
+      if (!pixel.has_surface() || !std::isfinite(level.depth(y, x))) continue;
+      Eigen::Vector3d const normal(pixel.normal[0], pixel.normal[1], pixel.normal[2]);
+      SurfaceSample sample{surface.camera.unproject(x, y, level.depth(y, x)),
+                           normal,
+                           pixel.sigma,
+                           static_cast<float>(-normal.dot(surface.camera.ray_direction(x, y).normalized())),
+                           nan_f(),
+                           x,
+                           y,
+                           pixel.crease};
       if (!surface.tone.empty()) sample.tone = surface.tone(y, x);
       surface.samples.push_back(sample);
+    }
+}
+
+// How the slopes change from pixel to pixel: between measured depths the surface bends, and chords would cut it off.
+void add_bends(std::vector<cv::Vec2f> const& slopes, ViewSurface& surface) {
+  int const width = surface.camera.width(), height = surface.camera.height();
+  auto const index = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+  };
+  for (int y = 1; y + 1 < height; ++y)
+    for (int x = 1; x + 1 < width; ++x) {
+      SurfacePixel& pixel = surface.pixels[index(x, y)];
+      if (!pixel.has_surface()) continue;
+      float const u = (slopes[index(x + 1, y)][0] - slopes[index(x - 1, y)][0]) / 2;
+      float const v = (slopes[index(x, y + 1)][1] - slopes[index(x, y - 1)][1]) / 2;
+      if (std::isfinite(u)) pixel.bend_u = u;
+      if (std::isfinite(v)) pixel.bend_v = v;
     }
 }
 
 ViewSurface fit_surface(Level const& level, bool finest) {
   ViewSurface surface;
   surface.camera = level.camera;
-  surface.depth = cv::Mat1f(level.depth.size(), nan_f());
-  surface.normal = cv::Mat3f(level.depth.size(), cv::Vec3f::all(nan_f()));
-  surface.sigma = cv::Mat1f(level.depth.size(), nan_f());
-  surface.crease = cv::Mat1b(level.depth.size(), uchar{0});
+  int const width = level.depth.cols, height = level.depth.rows;
+  surface.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  std::vector<cv::Vec2f> slopes(surface.pixels.size(), cv::Vec2f(nan_f(), nan_f()));
   int const radius = window_radius(level);
-  for (int y = 0; y < level.depth.rows; ++y)
-    for (int x = 0; x < level.depth.cols; ++x) fit_pixel(level, radius, x, y, surface);
+  WindowSums sums(level, radius);
+  std::size_t creases = 0, all = 0;
+  for (int y = 0; y < height; ++y) {
+    sums.go_to_row(y);
+    for (int x = 0; x < width; ++x) {
+      auto const center = window_center(level, x, y);
+      if (!center) continue;
+      std::optional<Plane> plane = sums.plane(x, *center);
+      double const steepest = kMaxSlope * level.camera.pixel_size(*center) / units_of(level.camera, *center);
+      // A whole window that is flat holds one surface.
+      if (!plane || is_crease(level, *plane, *center) ||
+          std::max(std::abs(plane->slope_u), std::abs(plane->slope_v)) > steepest)
+        plane = gather_plane(level, radius, x, y, *center);
+      auto const at = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+      if (!plane || !set_pixel(level, *plane, x, y, surface.pixels[at])) continue;
+      slopes[at] = cv::Vec2f(static_cast<float>(plane->slope_u), static_cast<float>(plane->slope_v));
+      creases += surface.pixels[at].crease ? 1 : 0;
+      ++all;
+    }
+  }
+  add_bends(slopes, surface);
   // On a coarse level, and on a surface that is rough everywhere, there is nothing better to be had.
-  int const creased = cv::countNonZero(surface.crease), all = cv::countNonZero(surface.depth == surface.depth);
-  if (!finest || creased > all / 2) surface.crease.setTo(0);
+  if (!finest || creases > all / 2)
+    for (SurfacePixel& pixel : surface.pixels) pixel.crease = false;
   return surface;
 }
 
@@ -247,10 +379,11 @@ bool is_only_shading(Level const& level, ViewSurface const& surface) {
   Eigen::Matrix<double, 9, 9> normal_matrix = Eigen::Matrix<double, 9, 9>::Zero();
   Vector9d right = Vector9d::Zero();
   double sum = 0, squares = 0, count = 0;
-  for (int y = 0; y < surface.depth.rows; ++y)
-    for (int x = 0; x < surface.depth.cols; ++x) {
-      if (!std::isfinite(surface.depth(y, x))) continue;
-      double const a = surface.normal(y, x)[0], b = surface.normal(y, x)[1], c = surface.normal(y, x)[2];
+  for (int y = 0; y < surface.camera.height(); ++y)
+    for (int x = 0; x < surface.camera.width(); ++x) {
+      if (!surface.has_surface(x, y)) continue;
+      float const* const normal = surface.at(x, y).normal;
+      double const a = normal[0], b = normal[1], c = normal[2];
       Vector9d row;
       row << 1, a, b, c, a * b, a * c, b * c, a * a - b * b, 3 * c * c - 1;
       double const value = std::exp(level.brightness(y, x));

@@ -90,7 +90,7 @@ TEST(ViewSurface, FitsPlanesExactlyAndLeavesOutlinesOut) {
     }
   SurfacePyramid const pyramid = build_pyramid(image);
   ViewSurface const& surface = pyramid.levels[0];
-  EXPECT_FALSE(std::isfinite(surface.depth(10, 30)));
+  EXPECT_FALSE(surface.has_surface(30, 10));
   for (SurfaceSample const& sample : surface.samples) {
     EXPECT_LT((sample.normal - normal).norm(), 1e-4);
     EXPECT_NEAR(normal.dot(sample.point), normal.dot(Eigen::Vector3d(0, 0, 2)), 1e-6);
