@@ -184,6 +184,7 @@ class Aligner {
     match.max_samples = std::clamp<std::size_t>(level > 0 ? 240000 / pairs : 480000 / pairs, 1500,
                                                 level > 0 ? kFewSamples / 2 : kFewSamples);
     if (uses_all_) match.max_samples = std::max(match.max_samples, kPairSamples / pairs);
+    match.is_near = uses_all_;
     if (scales_.geometry > 0) match.geometry_scale = scales_.geometry;
     if (scales_.tone > 0) match.tone_scale = scales_.tone;
     match.geometry_share = effective_share(scales_.geometry_correlation);

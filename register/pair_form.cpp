@@ -44,9 +44,10 @@ class SymmetricSum {
 // One view's contributions to the form, as they are summed up sample by sample.
 struct Sums {
   SymmetricSum shape, tone;
-  SymmetricSum shape_of_both;  // one normal from each view: unbiased by their noise
+  SymmetricSum shape_of_both;   // one normal from each view: unbiased by their noise
+  SymmetricSum smooth_of_both;  // of it, without creases
   Vector6d shape_gradient = Vector6d::Zero(), tone_gradient = Vector6d::Zero();
-  double shape_weight = 0, normal_difference = 0, matched = 0;
+  double smooth_weight = 0, normal_difference = 0, smooth_matched = 0;
   double cost = 0, cost_samples = 0;
   double tone_aa = 0, tone_bb = 0, tone_ab = 0;
 };
@@ -94,7 +95,7 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
   SurfaceSample const* last = nullptr;
   bool last_has_tone = false;
   for (SurfaceSample const& sample : from.samples) {
-    if (sample.crease || !(is_dense || grid.contains(sample))) continue;
+    if ((sample.crease && !options.is_near) || !(is_dense || grid.contains(sample))) continue;
     ++asked;
     sums.cost_samples += 1;
     sums.cost += 1;
@@ -102,7 +103,8 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
     SurfaceHit hit;
     if (!look_up(to, p, hit)) continue;
     Eigen::Vector3d const normal_from = to_from_from.linear() * sample.normal;
-    if (hit.crease || normal_from.dot(hit.normal) < options.min_normal_cos) continue;
+    if (hit.crease && !options.is_near) continue;
+    if (normal_from.dot(hit.normal) < options.min_normal_cos) continue;
     double const distance = hit.normal.dot(p - hit.point);
     double const cosine = hit.cosine(to.camera);
     if (cosine < 0.05 || std::abs(distance) > options.gate * cosine) continue;
@@ -126,9 +128,12 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
     sums.shape.add(weight, row);
     sums.shape_of_both.add(weight, row, row_other);
     sums.shape_gradient += weight * distance * row;
-    sums.shape_weight += weight;
-    sums.normal_difference += (normal_from - hit.normal).squaredNorm();
-    sums.matched += 1;
+    if (!sample.crease && !hit.crease) {
+      sums.smooth_of_both.add(weight, row, row_other);
+      sums.smooth_weight += weight;
+      sums.normal_difference += (normal_from - hit.normal).squaredNorm();
+      sums.smooth_matched += 1;
+    }
     double const of_gate = distance / (options.gate * cosine);
     double cost = std::min(1.0, of_gate * of_gate);
 
@@ -174,25 +179,31 @@ void match_one_way(ViewSurface const& from, ViewSurface const& to, Eigen::Isomet
 }
 
 // The information and the gradient of the shapes without the motions that they do not constrain beyond the noise of
-// their normals. Returns how many. With one normal from each view, noise neither holds a motion nor shortens a step.
-int hold_free_motions(Sums const& sums, Matrix6d& information, Vector6d& gradient) {
-  Eigen::SelfAdjointEigenSolver<Matrix6d> const spectrum(sums.shape_of_both.matrix() / sums.shape_weight);
-  double const normal_variance = sums.normal_difference / sums.matched / 4;  // an axis of one view's normals
-  double const independent = std::max(1.0, sums.matched / 25);               // windows overlap
+// their normals. Returns how many. With one normal from each view, noise neither holds a motion nor shortens a step;
+// but from afar the two belong to different places. The normals of creases are wrong in both views alike, and would
+// hold what the surface does not.
+int hold_free_motions(Sums const& sums, bool is_near, Matrix6d& information, Vector6d& gradient) {
+  if (!(sums.smooth_weight > 0)) {
+    information.setZero();
+    gradient.setZero();
+    return 6;
+  }
+  Eigen::SelfAdjointEigenSolver<Matrix6d> const spectrum(sums.smooth_of_both.matrix() / sums.smooth_weight);
+  double const normal_variance = sums.normal_difference / sums.smooth_matched / 4;  // an axis of one view's normals
+  double const independent = std::max(1.0, sums.smooth_matched / 25);               // windows overlap
   double const noise = 4 * normal_variance / std::sqrt(independent);
   double const threshold = std::max(1e-5, noise);
   // A motion comes in gradually above the threshold, so that two linearisations do not take turns.
-  Matrix6d held_information = Matrix6d::Zero(), share = Matrix6d::Zero();
+  Matrix6d root = Matrix6d::Zero(), share = Matrix6d::Zero();
   int held = 0;
   for (int k = 0; k < 6; ++k) {
-    double const value = spectrum.eigenvalues()[k];
-    double const trust = std::clamp(value / threshold - 1, 0.0, 2.0) / 2;
+    double const trust = std::clamp(spectrum.eigenvalues()[k] / threshold - 1, 0.0, 2.0) / 2;
     if (trust == 0) ++held;
     Matrix6d const outer = spectrum.eigenvectors().col(k) * spectrum.eigenvectors().col(k).transpose();
-    held_information += trust * sums.shape_weight * std::max(0.0, value) * outer;
+    root += std::sqrt(trust) * outer;
     share += trust * outer;
   }
-  information = held_information;
+  information = root * (is_near ? sums.shape_of_both : sums.shape).matrix() * root;
   gradient = share * gradient;
   return held;
 }
@@ -279,10 +290,10 @@ PairForm match_pair(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3
   bool const is_dense =
       SampleGrid(a, options.max_samples).pitch() == 1 && SampleGrid(b, options.max_samples).pitch() == 1;
   form.cost = sums.cost_samples > 0 ? sums.cost / sums.cost_samples : 1;
-  if (sums.matched > 0 && sums.shape_weight > 0) {
+  if (form.hits_ab + form.hits_ba > 0) {
     form.information = sums.shape.matrix();
     form.gradient = sums.shape_gradient;
-    if (options.hold_free_motions) form.held = hold_free_motions(sums, form.information, form.gradient);
+    if (options.hold_free_motions) form.held = hold_free_motions(sums, options.is_near, form.information, form.gradient);
   } else {
     form.held = 6;
   }

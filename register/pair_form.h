@@ -31,6 +31,9 @@ struct MatchOptions {
   double geometry_share = 1, tone_share = 1;
   std::size_t max_samples = 4000;  ///< a direction
   enum class Use { shape, shape_and_tone } use = Use::shape_and_tone;
+  /// The pose is right to a pixel or so: sharp features hold firmly, from afar their planes mislead; and corresponding
+  /// normals differ by their noise only, which then need not count as information.
+  bool is_near = false;
   /// Take out the motions that only noise of normals seems to constrain. Far from the right pose normals differ because
   /// the pose is wrong, and what would mend it must not be held.
   bool hold_free_motions = true;

@@ -127,14 +127,6 @@ void keep_distinct(std::vector<Candidate>& candidates, std::size_t count, Eigen:
   candidates = std::move(kept);
 }
 
-/// Whether the view's colour is more than a plain surface's noise.
-bool is_printed(ViewSurface const& view) {
-  std::vector<float> tones;
-  for (SurfaceSample const& sample : view.samples)
-    if (std::isfinite(sample.tone)) tones.push_back(sample.tone);
-  return tones.size() >= kFewestTones && robust_scale(tones) > kLeastPrint;
-}
-
 /// Correlation of the tones where the surfaces meet; 0 where too few do.
 double print_likeness(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d const& b_from_a, double gate,
                       double radius) {
@@ -194,6 +186,19 @@ PairPose::Verdict judge(PairPose const& pose, bool has_print) {
 
 }  // namespace
 
+bool has_print(SurfacePyramid const& view) {
+  std::vector<float> tones;
+  for (SurfaceSample const& sample : level_of(view, 1).samples)
+    if (std::isfinite(sample.tone)) tones.push_back(sample.tone);
+  return tones.size() >= kFewestTones && robust_scale(tones) > kLeastPrint;
+}
+
+double pose_score(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d const& b_from_a, double gate,
+                  double radius, std::size_t max_samples, bool are_printed) {
+  double const score = check_pose(level_of(a, 1), level_of(b, 1), b_from_a, gate, max_samples).score();
+  return are_printed && score > 0 ? score * agreement(print_likeness(a, b, b_from_a, gate, radius), score) : score;
+}
+
 PoseCheck check_pose(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3d const& b_from_a, double gate,
                      std::size_t max_samples) {
   PoseCheck check;
@@ -232,9 +237,9 @@ PairPose search_pair(SurfacePyramid const& a, SurfacePyramid const& b,
   keep_distinct(candidates, kRefined, a.centroid, radius);
   for (Candidate& candidate : candidates)
     refine(level_of(a, 2), level_of(b, 2), a, b, 2.5 * gate, 0.4 * gate, 15, kSomeSamples, radius, candidate.b_from_a);
-  bool const has_print = is_printed(level_of(a, 1)) && is_printed(level_of(b, 1));
+  bool const are_printed = has_print(a) && has_print(b);
   score_all(1, 0.4 * gate, kManySamples);
-  if (has_print)
+  if (are_printed)
     for (Candidate& candidate : candidates)
       candidate.score *= agreement(print_likeness(a, b, candidate.b_from_a, 0.4 * gate, radius), candidate.score);
   keep_distinct(candidates, kFinal, a.centroid, radius);
@@ -244,13 +249,15 @@ PairPose search_pair(SurfacePyramid const& a, SurfacePyramid const& b,
         refine(level_of(a, 1), level_of(b, 1), a, b, gate, 0.15 * gate, 15, kManySamples, radius, candidate.b_from_a);
     double const within = std::clamp(4 * misfit.distance, 0.2 * gate, 0.6 * gate);
     PoseCheck const check = check_pose(level_of(a, 1), level_of(b, 1), candidate.b_from_a, within, kManySamples);
-    double const likeness = has_print ? print_likeness(a, b, candidate.b_from_a, 0.2 * gate, radius) : 1;
+    double const likeness = are_printed ? print_likeness(a, b, candidate.b_from_a, 0.2 * gate, radius) : 1;
     double const score = check.score() * agreement(likeness, check.score());
     if (score <= best_score) continue;
     best_score = score;
-    best = {candidate.b_from_a, check, misfit.in_sigmas, likeness, PairPose::Verdict::refused};
+    best = {candidate.b_from_a, check, misfit.in_sigmas, misfit.distance, likeness, PairPose::Verdict::refused, {}};
   }
-  best.verdict = judge(best, has_print);
+  for (Candidate const& candidate : candidates)
+    if (!is_same(candidate.b_from_a, best.b_from_a, a.centroid, radius)) best.others.push_back(candidate.b_from_a);
+  best.verdict = judge(best, are_printed);
   return best;
 }
 

@@ -1,4 +1,7 @@
 #pragma once
+#include <algorithm>
+#include <vector>
+
 #include "register/feature_match.h"
 #include "register/pair_form.h"
 
@@ -36,11 +39,22 @@ struct PairPose {
   Eigen::Isometry3d b_from_a = Eigen::Isometry3d::Identity();
   PoseCheck check;      ///< at the end, on the finest level that was used
   double misfit = 0;    ///< robust standard deviation of the distances, in their sigmas
+  double distance = 0;  ///< robust standard deviation of the distances, units
   double likeness = 1;  ///< correlation of the print where the surfaces meet; 1 where a view has none
   /// `firm`: nothing contradicts it, and it fits as well as noise lets it. `weak`: it may be right, as poses of sensors
   /// whose depths bend are; other views must confirm it.
   enum class Verdict { refused, weak, firm } verdict = Verdict::refused;
+  /// What speaks for it: `PoseCheck::score`, less where print does not meet itself.
+  double strength() const { return std::max(0.0, check.score()) * std::max(likeness, 0.0); }
+  std::vector<Eigen::Isometry3d> others;  ///< further poses that were looked at to the end
 };
+
+/// Whether a view's colour is more than a plain surface's noise.
+bool has_print(SurfacePyramid const& view);
+
+/// `PoseCheck::score` on the second level; where both views have print, the less it meets itself the less.
+double pose_score(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d const& b_from_a, double gate,
+                  double radius, std::size_t max_samples, bool are_printed);
 
 /// The pose of a in b's frame from nothing: two matched features with their normals make a pose (point pairs; Drost and
 /// others 2010), all such pairs whose distances and angles agree are looked at, the best by `PoseCheck` on a few

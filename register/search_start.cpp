@@ -7,6 +7,7 @@
 
 #include "base/median.h"
 #include "base/parallel.h"
+#include "register/assembly.h"
 #include "register/joint_refinement.h"
 #include "register/pair_search.h"
 #include "register/shape_features.h"
@@ -103,6 +104,10 @@ class Search {
       for_each_index(
           context_, found.size(), [&](std::size_t k) { found[k].pose = search_one(found[k].a, found[k].b); },
           "register: search");
+      for (Link const& link : found) {
+        hypotheses_.push_back({link.a, link.b, link.pose.others});
+        hypotheses_.back().b_from_a.push_back(link.pose.b_from_a);
+      }
       for (Link const& link : found)
         if (link.pose.verdict != PairPose::Verdict::refused && !known(link.a, link.b)) links_.push_back(link);
       if (joined()) return;
@@ -119,7 +124,11 @@ class Search {
     // Where surfaces are smooth, or the overlap is narrow, the wider surroundings tell more.
     if (is_firm(pose)) return pose;
     PairPose const other = search_pair(views_[a], views_[b], {{&wide_[a], &wide_[b]}}, {}, options);
-    return is_firm(other) || other.check.score() > pose.check.score() ? other : pose;
+    PairPose best = is_firm(other) || other.check.score() > pose.check.score() ? other : pose;
+    PairPose const& less = best.b_from_a.isApprox(pose.b_from_a) ? other : pose;
+    best.others.insert(best.others.end(), less.others.begin(), less.others.end());
+    best.others.push_back(less.b_from_a);
+    return best;
   }
 
   bool known(std::size_t a, std::size_t b) const {
@@ -154,22 +163,29 @@ class Search {
         fmt::format("the link of {} and {} is dropped: {}", set_.views[link.a].name, set_.views[link.b].name, why));
   }
 
-  // Open triangles less closed ones, of every link.
-  std::vector<int> balances() const {
-    std::map<std::pair<std::size_t, std::size_t>, Eigen::Isometry3d> motion;
+  // Open triangles less closed ones, of every link. A triangle counts as much as its weaker other link, against this
+  // one's own strength.
+  std::vector<double> balances() const {
+    struct Step {
+      Eigen::Isometry3d motion;
+      double strength;
+    };
+    std::map<std::pair<std::size_t, std::size_t>, Step> motion;
     for (Link const& link : links_) {
-      motion[{link.a, link.b}] = link.pose.b_from_a;
-      motion[{link.b, link.a}] = link.pose.b_from_a.inverse();
+      motion[{link.a, link.b}] = {link.pose.b_from_a, link.pose.strength()};
+      motion[{link.b, link.a}] = {link.pose.b_from_a.inverse(), link.pose.strength()};
     }
-    std::vector<int> balances(links_.size(), 0);
+    std::vector<double> balances(links_.size(), 0);
     for (std::size_t k = 0; k < links_.size(); ++k) {
       Link const& link = links_[k];
       for (std::size_t c = 0; c < views_.size(); ++c) {
         auto const there = motion.find({link.a, c}), on = motion.find({c, link.b});
         if (there == motion.end() || on == motion.end()) continue;
-        bool const closes = motion_difference(on->second * there->second, link.pose.b_from_a, views_[link.a].centroid,
-                                              radius_) < kAgreement * radius_;
-        balances[k] += closes ? -1 : 1;
+        bool const closes = motion_difference(on->second.motion * there->second.motion, link.pose.b_from_a,
+                                              views_[link.a].centroid, radius_) < kAgreement * radius_;
+        double const weight =
+            std::min(there->second.strength, on->second.strength) / std::max(link.pose.strength(), 1e-9);
+        balances[k] += closes ? -weight : weight;
       }
     }
     return balances;
@@ -178,21 +194,21 @@ class Search {
   // The worst first, since a wrong link spoils the triangles of right ones; of equals the one that fits worse.
   void drop_by_triangles() {
     for (;;) {
-      std::vector<int> const balance = balances();
+      std::vector<double> const balance = balances();
       std::size_t worst = 0;
       for (std::size_t k = 1; k < links_.size(); ++k) {
         double const here = links_[k].pose.check.contradiction(), there = links_[worst].pose.check.contradiction();
         if (std::pair(balance[k], here) > std::pair(balance[worst], there)) worst = k;
       }
       if (links_.empty() || balance[worst] <= 0) return;
-      drop(links_[worst], fmt::format("{} more of its triangles stay open than close", balance[worst]));
+      drop(links_[worst], fmt::format("triangles with other links contradict it ({:.1f} more than confirm it)", balance[worst]));
       links_.erase(links_.begin() + static_cast<std::ptrdiff_t>(worst));
     }
   }
 
   // Weak links stay where a triangle closes, or where nothing else joins two views and little contradicts them.
   void drop_unconfirmed() {
-    std::vector<int> const balance = balances();
+    std::vector<double> const balance = balances();
     std::vector<Link> kept, open;
     for (std::size_t k = 0; k < links_.size(); ++k)
       (is_firm(links_[k].pose) || balance[k] < 0 ? kept : open).push_back(links_[k]);
@@ -216,7 +232,7 @@ class Search {
   SearchStart place() {
     std::size_t const n = views_.size();
     std::stable_sort(links_.begin(), links_.end(),
-                     [](Link const& l, Link const& r) { return l.pose.check.matched > r.pose.check.matched; });
+                     [](Link const& l, Link const& r) { return l.pose.strength() > r.pose.strength(); });
     SearchStart start;
     start.object_from_camera.assign(n, Eigen::Isometry3d::Identity());
     auto& poses = start.object_from_camera;
@@ -242,6 +258,7 @@ class Search {
     }
     start.links = problem.pairs.size();
     poses = solve_joint(problem, joint_spectrum(problem), PairLoss::cauchy).object_from_camera;
+    reconsider(tree, poses);
     for (std::size_t p = 1; p < start.parts.size(); ++p) {
       Eigen::Isometry3d const aside(
           Eigen::Translation3d(kApart * radius_ * static_cast<double>(p) * Eigen::Vector3d::UnitX()));
@@ -251,10 +268,28 @@ class Search {
     return start;
   }
 
+  void reconsider(std::vector<ViewGraphEdge> const& tree, std::vector<Eigen::Isometry3d>& poses) {
+    std::vector<double> distances;
+    for (Link const& link : links_) distances.push_back(link.pose.distance);
+    if (distances.empty() || views_.size() > kAllPairs) return;
+    AssemblyOptions options;
+    options.radius = radius_;
+    options.gate = std::clamp(4 * median(distances), 0.01 * radius_, 0.03 * radius_);
+    std::size_t moves = 0;
+    for (auto const& part : connected_parts(views_.size(), tree)) {
+      std::vector<std::pair<std::size_t, std::size_t>> joins;
+      for (ViewGraphEdge const& edge : tree)
+        if (std::find(part.begin(), part.end(), edge.a) != part.end()) joins.emplace_back(edge.a, edge.b);
+      moves += improve_assembly(views_, hypotheses_, joins, options, poses, context_);
+    }
+    if (moves > 0) context_.log(fmt::format("search: {} moves that fit all the views better", moves));
+  }
+
   ScanSet const& set_;
   std::vector<SurfacePyramid> const& views_;
   double radius_;
   Context& context_;
+  std::vector<PairHypotheses> hypotheses_;
   std::vector<Features> near_, wide_, color_;  // of shape by neighbourhood, and of colour
   std::vector<Link> links_;
 };
