@@ -107,7 +107,8 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
   record.options["seed"] = context.seed;
   record.inputs["scanset.json#cameras"] = hash_bytes(cameras.dump());
   record.inputs["scanset.json#initial_poses"] = hash_bytes(initial.dump());
-  if (request.start == RegisterRequest::Start::file) record.inputs["init"] = hash_file(request.pose_file);
+  if (request.start == RegisterRequest::Start::file)
+    record.inputs["init"] = hash_file(find_pose_file(request.pose_file));
   // The manifest may have been put back to the initial poses: the record's inputs fit, but not what it vouches for.
   if (fs::exists(folder / "poses.json") &&
       read_json(folder / "poses.json").value("registered", Json()) != poses_json(manifest)) {
