@@ -26,6 +26,10 @@ TEST_F(Pipeline, ASyntheticScanComesBack) {
   Json const registered = run({"register", in("set"), "--reference", in("scan/truth/scanset.json")});
   Context context;
   double const size = 2 * read_scan_set(in("set"), context).radius();
+  for (auto const& pair : registered["pairs"])
+    EXPECT_LE(pair["median_distance"].get<double>(), registered["worst_pair"]["median_distance"].get<double>());
+  EXPECT_GT(registered["poses"]["000"]["seen_by"].get<double>(), 0.5);
+  EXPECT_GT(registered["error"]["p95"].get<double>(), registered["error"]["rms"].get<double>());
   EXPECT_LE(registered["reference"]["median_deg"].get<double>(), 0.05);
   EXPECT_LE(registered["reference"]["median_length"].get<double>(), 1e-3 * size);
 
