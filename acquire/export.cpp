@@ -27,14 +27,10 @@ constexpr double kColmapPoints = 50'000;
 static_assert(std::endian::native == std::endian::little, "COLMAP's depth maps are written as they lie in memory");
 
 void require_exportable(fs::path const& path, ScanSet const& set) {
-  if (set.views.empty()) throw Error(ErrorCode::bad_input, path, "nothing to export: the set has no views");
-  for (View const& view : set.views) {
-    if (!view.object_from_camera)
-      throw Error(ErrorCode::bad_input, path,
-                  "cannot export view " + view.name + ": it has no pose (register the set first)");
+  require_poses(path, set);
+  for (View const& view : set.views)
     if (view.image.color.empty())
       throw Error(ErrorCode::bad_input, path, "cannot export view " + view.name + ": it has no colour");
-  }
 }
 
 void require_perspective(fs::path const& path, ScanSet const& set, std::string const& format) {
@@ -206,6 +202,14 @@ Json opengl_matrix(Eigen::Isometry3d const& object_from_camera) {
 }
 
 }  // namespace
+
+void require_poses(fs::path const& path, ScanSet const& set) {
+  if (set.views.empty()) throw Error(ErrorCode::bad_input, path, "nothing to export: the set has no views");
+  for (View const& view : set.views)
+    if (!view.object_from_camera)
+      throw Error(ErrorCode::bad_input, path,
+                  "cannot export view " + view.name + ": it has no pose (register the set first)");
+}
 
 void export_point_cloud(fs::path const& path, ScanSet const& set, Context& context) {
   require_exportable(path, set);

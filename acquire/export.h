@@ -11,6 +11,9 @@ namespace scanview {
 // view's gain (in linear light), as our renderers do. All throw Error{bad_input} for a set without views, with a view
 // that has no pose or no colour, and Error{io} where writing fails.
 
+/// Throws Error{bad_input, path} naming the first view that has no pose, or where the set has no views.
+void require_poses(std::filesystem::path const& path, ScanSet const& set);
+
 /// All depths of all views as one coloured point cloud in object coordinates: binary little-endian PLY with x y z,
 /// nx ny nz (float; towards the camera that saw the point; 0 0 0 where it has too few neighbours) and red green blue.
 /// About 72 bytes of memory a point.

@@ -49,6 +49,16 @@ ImportResult import_nerfstudio(std::filesystem::path const& path, ImportOptions 
 /// .photometric.bin).
 ImportResult import_colmap(std::filesystem::path const& path, ImportOptions const& options, Context& context);
 
+// The poses alone of what these two read, as a set whose views have a name (the one that import gives them) and a pose,
+// but no camera and no picture. Every pose must be one: else Error{bad_input} naming file and frame.
+
+/// images.txt of a COLMAP text model.
+ScanSet read_colmap_poses(std::filesystem::path const& path);
+/// transforms.json; its "unit" is the set's, `arbitrary` where it names none.
+ScanSet read_nerfstudio_poses(std::filesystem::path const& path);
+/// The images.txt of a COLMAP workspace or model folder; empty where there is none.
+std::filesystem::path find_colmap_images(std::filesystem::path const& folder);
+
 /// "rgbd", "stanford", "nerfstudio", "colmap": what `path` looks like; empty where it is none of these.
 std::string guess_import_kind(std::filesystem::path const& path);
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <map>
-#include <sstream>
 
 #include "acquire/import_build.h"
 #include "acquire/rgbd_manifest.h"
+#include "acquire/text_table.h"
 #include "base/error.h"
 #include "base/image_file.h"
 
@@ -21,43 +21,14 @@ namespace fs = std::filesystem;
   throw Error(ErrorCode::bad_input, path, message);
 }
 
-double number(std::string const& word, fs::path const& path, std::size_t line) {
-  double value = 0;
-  auto const [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (problem != std::errc() || end != word.data() + word.size())
-    fail(path, fmt::format("line {}: '{}' is no number", line, word.substr(0, 40)));
-  return value;
-}
-
-struct Line {
-  std::size_t number;
-  std::vector<std::string> words;
-};
-
-/// Lines without comments; blank ones stay where asked for (an image without points has a blank second line).
-std::vector<Line> read_lines(fs::path const& path) {
-  std::vector<Line> lines;
-  std::istringstream text(read_file(path));
-  std::size_t count = 0;
-  for (std::string line; std::getline(text, line);) {
-    ++count;
-    if (line.starts_with('#')) continue;
-    std::istringstream stream(line);
-    Line entry{count, {}};
-    for (std::string word; stream >> word;) entry.words.push_back(word);
-    lines.push_back(std::move(entry));
-  }
-  return lines;
-}
-
 std::map<std::string, LensCamera> read_cameras(fs::path const& path) {
   std::map<std::string, LensCamera> cameras;
-  for (auto const& [line, words] : read_lines(path)) {
+  for (auto const& [line, words] : read_text_lines(path)) {
     if (words.empty()) continue;
     if (words.size() < 5) fail(path, fmt::format("line {} is not 'id model width height parameters'", line));
     std::string const& model = words[1];
     std::vector<double> p;
-    for (std::size_t i = 4; i < words.size(); ++i) p.push_back(number(words[i], path, line));
+    for (std::size_t i = 4; i < words.size(); ++i) p.push_back(text_number(words[i], path, line));
     static std::map<std::string, std::size_t> const counts{
         {"SIMPLE_PINHOLE", 3}, {"PINHOLE", 4}, {"SIMPLE_RADIAL", 4}, {"RADIAL", 5}, {"OPENCV", 8}};
     auto const known = counts.find(model);
@@ -73,7 +44,7 @@ std::map<std::string, LensCamera> read_cameras(fs::path const& path) {
     if (model == "SIMPLE_RADIAL") k.lens = {.k1 = p[3]};
     if (model == "RADIAL") k.lens = {.k1 = p[3], .k2 = p[4]};
     if (model == "OPENCV") k.lens = {.k1 = p[4], .k2 = p[5], .p1 = p[6], .p2 = p[7]};
-    double const width = number(words[2], path, line), height = number(words[3], path, line);
+    double const width = text_number(words[2], path, line), height = text_number(words[3], path, line);
     if (!(width >= 1 && width <= 32768 && height >= 1 && height <= 32768))
       fail(path, fmt::format("line {}: size out of range", line));
     try {
@@ -91,13 +62,13 @@ std::map<std::string, LensCamera> read_cameras(fs::path const& path) {
 
 struct Image {
   std::string name, camera;
-  double q[4], t[3];  ///< camera_from_world, w first
+  double q[4], t[3];  ///< camera_from_world, w first; checked by `pose`, so that a bad one costs one view
 };
 
 std::vector<Image> read_images(fs::path const& path) {
   std::vector<Image> images;
   bool points = false;  // every second line lists the image's points, and may be blank
-  for (auto const& [line, words] : read_lines(path)) {
+  for (auto const& [line, words] : read_text_lines(path)) {
     if (points) {
       points = false;
       continue;
@@ -105,8 +76,8 @@ std::vector<Image> read_images(fs::path const& path) {
     if (words.empty()) continue;
     if (words.size() < 10) fail(path, fmt::format("line {} is not 'id qw qx qy qz tx ty tz camera name'", line));
     Image image;
-    for (std::size_t i = 0; i < 4; ++i) image.q[i] = number(words[1 + i], path, line);
-    for (std::size_t i = 0; i < 3; ++i) image.t[i] = number(words[5 + i], path, line);
+    for (std::size_t i = 0; i < 4; ++i) image.q[i] = text_number(words[1 + i], path, line);
+    for (std::size_t i = 0; i < 3; ++i) image.t[i] = text_number(words[5 + i], path, line);
     image.camera = words[8];
     image.name = words[9];
     for (std::size_t i = 10; i < words.size(); ++i) image.name += " " + words[i];
@@ -115,6 +86,20 @@ std::vector<Image> read_images(fs::path const& path) {
   }
   if (images.empty()) fail(path, "no image");
   return images;
+}
+
+/// The views' names, in the order of the images.
+std::vector<std::string> view_names(std::vector<Image> const& images) {
+  std::vector<std::string> names;
+  for (auto const& image : images) names.push_back(fs::path(image.name).replace_extension().string());
+  return safe_view_names(names);
+}
+
+/// world_from_camera.
+Eigen::Isometry3d pose(Image const& image, fs::path const& list) {
+  return pose_from_quaternion({image.q[0], image.q[1], image.q[2], image.q[3]}, {image.t[0], image.t[1], image.t[2]},
+                              list, "the pose of " + image.name)
+      .inverse();
 }
 
 /// "width&height&channels&" and 32-bit little-endian floats, row by row; not positive where nothing is known.
@@ -149,10 +134,8 @@ struct Workspace {
 Workspace find_workspace(fs::path const& path) {
   if (!fs::is_directory(path)) fail(path, "no such folder");
   Workspace found;
-  for (char const* folder : {"sparse", "sparse/0", ".", "model"})
-    if (found.model.empty() && fs::exists(path / folder / "cameras.txt") && fs::exists(path / folder / "images.txt"))
-      found.model = path / folder;
-  if (found.model.empty())
+  found.model = find_colmap_images(path).parent_path();
+  if (found.model.empty() || !fs::exists(found.model / "cameras.txt"))
     fail(path, fs::is_empty(path) ? "the folder is empty"
                                   : "no text model (cameras.txt, images.txt) here, in sparse/ or in sparse/0/");
   found.images = path / "images";
@@ -167,13 +150,8 @@ RawView load(Image const& image, Workspace const& workspace, fs::path const& dep
   auto const k = cameras.find(image.camera);
   if (k == cameras.end())
     fail(list, fmt::format("image {} has camera {}, which is not there", image.name, image.camera));
-  for (double const value : {image.q[0], image.q[1], image.q[2], image.q[3], image.t[0], image.t[1], image.t[2]})
-    if (!std::isfinite(value)) fail(list, fmt::format("the pose of {} is not finite", image.name));
-  Eigen::Quaterniond const q(image.q[0], image.q[1], image.q[2], image.q[3]);
-  if (std::abs(q.norm() - 1) > 1e-2) fail(list, fmt::format("the pose of {} is no rotation", image.name));
-  Eigen::Isometry3d const camera_from_world = Eigen::Translation3d(image.t[0], image.t[1], image.t[2]) * q.normalized();
   RawView raw;
-  raw.object_from_camera = camera_from_world.inverse();
+  raw.object_from_camera = pose(image, list);
   raw.camera = k->second.camera;
   cv::Mat3b const color = read_color(workspace.images / image.name);
   cv::Mat1f const depth = read_depth_map(depth_path);
@@ -191,19 +169,37 @@ RawView load(Image const& image, Workspace const& workspace, fs::path const& dep
 
 }  // namespace
 
+fs::path find_colmap_images(fs::path const& folder) {
+  for (char const* model : {"sparse", "sparse/0", ".", "model"})
+    if (fs::exists(folder / model / "images.txt")) return folder / model / "images.txt";
+  return {};
+}
+
+ScanSet read_colmap_poses(fs::path const& path) {
+  auto const images = read_images(path);
+  auto const names = view_names(images);
+  ScanSet set;
+  set.unit = Unit::arbitrary;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    View view;
+    view.name = names[i];
+    view.object_from_camera = pose(images[i], path);
+    set.views.push_back(std::move(view));
+  }
+  return set;
+}
+
 ImportResult import_colmap(fs::path const& path, ImportOptions const& options, Context& context) {
   Workspace const workspace = find_workspace(path);
   auto const cameras = read_cameras(workspace.model / "cameras.txt");
   auto const images = read_images(workspace.model / "images.txt");
-  std::vector<std::string> names;
+  auto const names = view_names(images);
   std::vector<fs::path> depths;
   for (auto const& image : images) {
-    names.push_back(fs::path(image.name).replace_extension().string());
     // Filtered by consistency between views where it is there.
     fs::path const geometric = workspace.depths / (image.name + ".geometric.bin");
     depths.push_back(fs::exists(geometric) ? geometric : workspace.depths / (image.name + ".photometric.bin"));
   }
-  names = safe_view_names(names);
   BuildPlan plan;
   plan.path = path;
   plan.unit = Unit::arbitrary;

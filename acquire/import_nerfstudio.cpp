@@ -74,32 +74,60 @@ LensCamera intrinsics(Json const& frame, Json const& all, cv::Size picture, fs::
 }
 
 /// object_from_camera; theirs has y up and looks along -z.
-Eigen::Isometry3d pose(Json const& frame, fs::path const& path) {
+Eigen::Isometry3d pose(Json const& frame, std::string const& name, fs::path const& path) {
+  std::string const what = fmt::format("'transform_matrix' of frame {}", name);
   auto const found = frame.find("transform_matrix");
-  if (found == frame.end()) fail(path, "'transform_matrix' is missing");
+  if (found == frame.end()) fail(path, what + " is missing");
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  if (!found->is_array() || (found->size() != 4 && found->size() != 3)) fail(path, "'transform_matrix' is not 4 rows");
+  if (!found->is_array() || (found->size() != 4 && found->size() != 3)) fail(path, what + " is not 4 rows");
   for (std::size_t row = 0; row < found->size(); ++row) {
     Json const& numbers = (*found)[row];
-    if (!numbers.is_array() || numbers.size() != 4) fail(path, "'transform_matrix' has a row that is not 4 numbers");
+    if (!numbers.is_array() || numbers.size() != 4) fail(path, what + " has a row that is not 4 numbers");
     for (std::size_t col = 0; col < 4; ++col) {
-      if (!numbers[col].is_number()) fail(path, "'transform_matrix' has an entry that is no number");
+      if (!numbers[col].is_number()) fail(path, what + " has an entry that is no number");
       matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(col)) = numbers[col].get<double>();
     }
   }
-  Eigen::Isometry3d result = pose_from_matrix(matrix, path, "'transform_matrix'");
+  Eigen::Isometry3d result = pose_from_matrix(matrix, path, what);
   result.linear() = result.linear() * Eigen::Vector3d(1, -1, -1).asDiagonal();
   return result;
 }
 
+/// The whole file, with an object for each frame.
+Json read_transforms(fs::path const& path) {
+  if (!fs::is_regular_file(path)) fail(path, "no such file");
+  Json all = read_json(path);
+  if (!all.is_object() || !all.contains("frames") || !all["frames"].is_array()) fail(path, "no list 'frames'");
+  for (auto const& frame : all["frames"])
+    if (!frame.is_object()) fail(path, "a frame is no object");
+  return all;
+}
+
+Unit unit_of(Json const& all, fs::path const& path) {
+  auto const found = all.find("unit");
+  return found != all.end() && found->is_string() ? unit_from_string(found->get<std::string>(), path) : Unit::arbitrary;
+}
+
+/// The views' names, in the order of the frames.
+std::vector<std::string> view_names(Json const& frames, fs::path const& path) {
+  std::vector<std::string> names;
+  for (auto const& frame : frames) {
+    auto const color = file(frame, "file_path", path);
+    if (!color) fail(path, "a frame without 'file_path'");
+    names.push_back(color->stem().string());
+  }
+  return safe_view_names(names);
+}
+
 struct FrameFiles {
+  std::string view;
   fs::path color, depth;
   std::optional<fs::path> mask;
 };
 
 RawView load(Json const& frame, Json const& all, FrameFiles const& files, double depth_unit, fs::path const& path) {
   RawView raw;
-  raw.object_from_camera = pose(frame, path);
+  raw.object_from_camera = pose(frame, files.view, path);
   cv::Mat3b const color = read_color(files.color);
   LensCamera const k = intrinsics(frame, all, color.size(), path);
   raw.camera = k.camera;
@@ -130,39 +158,44 @@ RawView load(Json const& frame, Json const& all, FrameFiles const& files, double
 
 }  // namespace
 
+ScanSet read_nerfstudio_poses(fs::path const& path) {
+  Json const all = read_transforms(path);
+  auto const names = view_names(all["frames"], path);
+  ScanSet set;
+  set.unit = unit_of(all, path);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    View view;
+    view.name = names[i];
+    view.object_from_camera = pose(all["frames"][i], names[i], path);
+    set.views.push_back(std::move(view));
+  }
+  return set;
+}
+
 ImportResult import_nerfstudio(fs::path const& path, ImportOptions const& options, Context& context) {
   fs::path const manifest = fs::is_directory(path) ? path / "transforms.json" : path;
-  if (!fs::is_regular_file(manifest)) fail(manifest, "no such file");
-  Json const all = read_json(manifest);
-  if (!all.is_object() || !all.contains("frames") || !all["frames"].is_array()) fail(manifest, "no list 'frames'");
+  Json const all = read_transforms(manifest);
   Json const nothing = Json::object();
   double const depth_unit = number(all, nothing, "depth_unit_scale_factor", manifest).value_or(0.001);
   if (!(depth_unit > 0)) fail(manifest, "'depth_unit_scale_factor' is not positive");
 
   BuildPlan plan;
   plan.path = manifest;
-  plan.unit = Unit::arbitrary;
-  if (auto const found = all.find("unit"); found != all.end() && found->is_string())
-    plan.unit = unit_from_string(found->get<std::string>(), manifest);
+  plan.unit = unit_of(all, manifest);
   plan.noise = [&](double typical) { return sensor_noise(plan.unit, depth_unit, typical); };
+  Json const& frames = all["frames"];
+  auto const names = view_names(frames, manifest);
   std::vector<FrameFiles> files;
-  std::vector<std::string> names;
-  for (auto const& frame : all["frames"]) {
-    if (!frame.is_object()) fail(manifest, "a frame is no object");
-    auto const color = file(frame, "file_path", manifest);
-    auto const depth = file(frame, "depth_file_path", manifest);
-    if (!color) fail(manifest, "a frame without 'file_path'");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    fs::path const color = *file(frames[i], "file_path", manifest);
+    auto const depth = file(frames[i], "depth_file_path", manifest);
     if (!depth)
       fail(manifest, fmt::format("frame {} has no 'depth_file_path': only frames with depth can be imported",
-                                 color->filename().string()));
-    files.push_back({existing(*color), *depth, file(frame, "mask_path", manifest)});
-    names.push_back(color->stem().string());
+                                 color.filename().string()));
+    files.push_back({names[i], existing(color), *depth, file(frames[i], "mask_path", manifest)});
   }
-  names = safe_view_names(names);
   for (std::size_t i = 0; i < files.size(); ++i)
-    plan.views.push_back({names[i], [&, &frame = all["frames"][i], &own = files[i]] {
-                            return load(frame, all, own, depth_unit, manifest);
-                          }});
+    plan.views.push_back({names[i], [&, i] { return load(frames[i], all, files[i], depth_unit, manifest); }});
   ImportResult result = build_import(plan, options, context);
   result.files_read.push_back(manifest);
   for (std::size_t i = 0; i < files.size(); i += static_cast<std::size_t>(options.step)) {

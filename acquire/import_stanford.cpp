@@ -6,11 +6,11 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <sstream>
 
 #include "acquire/archive.h"
 #include "acquire/depth_resample.h"
 #include "acquire/import_build.h"
+#include "acquire/stanford_conf.h"
 #include "base/error.h"
 #include "base/ply.h"
 
@@ -21,45 +21,6 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void fail(fs::path const& path, std::string const& message) {
   throw Error(ErrorCode::bad_input, path, message);
-}
-
-/// One `bmesh FILE tx ty tz qx qy qz qw` line. Its numbers are checked when the view is loaded, so that a bad line
-/// costs one view.
-struct ConfLine {
-  std::string file;
-  std::vector<double> numbers;
-};
-
-std::vector<ConfLine> parse_conf(std::string const& text, fs::path const& path) {
-  std::vector<ConfLine> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) {
-    std::istringstream words(line);
-    std::string word;
-    if (!(words >> word) || word != "bmesh") continue;  // "camera", and "mesh": scans without a grid
-    ConfLine entry;
-    words >> entry.file;
-    while (words >> word) {
-      double value = std::nan("");
-      auto const [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
-      if (problem != std::errc() || end != word.data() + word.size()) value = std::nan("");
-      entry.numbers.push_back(value);
-    }
-    lines.push_back(std::move(entry));
-  }
-  if (lines.empty()) fail(path, "no 'bmesh FILE tx ty tz qx qy qz qw' line");
-  return lines;
-}
-
-/// world = R(q)^T p + t: the conf's quaternion is that of the inverse rotation.
-Eigen::Isometry3d world_from_scan(ConfLine const& line, fs::path const& conf) {
-  auto const& n = line.numbers;
-  if (n.size() != 7) fail(conf, fmt::format("the line of {} has {} numbers instead of 7", line.file, n.size()));
-  for (double const value : n)
-    if (!std::isfinite(value)) fail(conf, fmt::format("the pose of {} has a number that is not finite", line.file));
-  Eigen::Quaterniond const q(n[6], n[3], n[4], n[5]);
-  if (std::abs(q.norm() - 1) > 1e-2) fail(conf, fmt::format("the pose of {} is no rotation", line.file));
-  return Eigen::Translation3d(n[0], n[1], n[2]) * q.normalized().conjugate();
 }
 
 /// The scan's points in their grid, in scan coordinates: x right, y up, seen from +z. NaN where the grid is empty.

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <map>
-#include <sstream>
 #include <utility>
 
+#include "acquire/text_table.h"
+#include "acquire/trajectory.h"
 #include "base/error.h"
 #include "base/image_file.h"
 
@@ -36,40 +35,15 @@ bool is_picture(fs::path const& path) {
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".PNG" || ending == ".JPG";
 }
 
-std::vector<std::string> words_of(std::string const& line) {
-  std::istringstream stream(line);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
-
-/// "nan" and "inf" are numbers here: one bad pose costs one view.
-double any_number(std::string const& word, fs::path const& path, std::size_t line) {
-  double value = 0;
-  char const* const begin = word.data() + (word.starts_with('+') ? 1 : 0);
-  auto const [end, problem] = std::from_chars(begin, word.data() + word.size(), value);
-  if (problem != std::errc() || end != word.data() + word.size())
-    fail(path, fmt::format("line {}: '{}' is no number", line, word.substr(0, 40)));
-  return value;
-}
-
 double number(std::string const& word, fs::path const& path, std::size_t line) {
-  double const value = any_number(word, path, line);
+  double const value = text_number(word, path, line);
   if (!std::isfinite(value)) fail(path, fmt::format("line {}: '{}' is not finite", line, word));
   return value;
 }
 
-/// Lines without comments and blank ones, with their numbers.
-std::vector<std::pair<std::size_t, std::vector<std::string>>> table_of(fs::path const& path) {
-  std::vector<std::pair<std::size_t, std::vector<std::string>>> rows;
-  std::istringstream text(read_file(path));
-  std::size_t line_number = 0;
-  for (std::string line; std::getline(text, line);) {
-    ++line_number;
-    auto words = words_of(line);
-    if (!words.empty() && !words.front().starts_with('#')) rows.emplace_back(line_number, std::move(words));
-  }
-  return rows;
+/// The problem of a pose with the file's name; empty where there is none.
+std::string named(fs::path const& path, std::string const& problem) {
+  return problem.empty() ? problem : fmt::format("{}: {}", path.string(), problem);
 }
 
 /// The size of the first of these pictures that can be read.
@@ -112,7 +86,7 @@ RgbdSource read_seven_scenes(fs::path const& folder) {
   if (fs::exists(calibration)) {
     source.files.push_back(calibration);
     std::vector<double> k;
-    for (auto const& [line, words] : table_of(calibration))
+    for (auto const& [line, words] : read_text_table(calibration))
       for (auto const& word : words) k.push_back(number(word, calibration, line));
     if (k.size() < 9) fail(calibration, "intrinsics are 3 rows of 3 numbers");
     source.color.camera = Camera::perspective(size.width, size.height, k[0], k[4], k[2], k[5]);
@@ -133,7 +107,7 @@ struct Stamped {
 
 std::vector<Stamped> read_stamps(fs::path const& list) {
   std::vector<Stamped> stamps;
-  for (auto const& [line, words] : table_of(list)) {
+  for (auto const& [line, words] : read_text_table(list)) {
     if (words.size() < 2) fail(list, fmt::format("line {} is not 'time file'", line));
     stamps.push_back({number(words[0], list, line), list.parent_path() / words[1]});
   }
@@ -156,33 +130,9 @@ std::optional<std::size_t> nearest_in_time(std::vector<Entry> const& entries, do
   return best;
 }
 
-struct StampedPose {
-  double time;
-  Eigen::Isometry3d pose;
-  std::string problem;
-};
-
-std::vector<StampedPose> read_trajectory(fs::path const& path) {
-  std::vector<StampedPose> poses;
-  for (auto const& [line, words] : table_of(path)) {
-    if (words.size() < 8) fail(path, fmt::format("line {} is not 'time tx ty tz qx qy qz qw'", line));
-    double v[8];
-    for (std::size_t i = 0; i < 8; ++i) v[i] = i == 0 ? number(words[i], path, line) : any_number(words[i], path, line);
-    Eigen::Quaterniond const q(v[7], v[4], v[5], v[6]);
-    Eigen::Vector3d const t(v[1], v[2], v[3]);
-    if (!t.allFinite() || !(std::abs(q.norm() - 1) <= 1e-2))
-      poses.push_back({v[0], Eigen::Isometry3d::Identity(),
-                       fmt::format("{}: line {}: the pose is not finite or no rotation", path.string(), line)});
-    else
-      poses.push_back({v[0], Eigen::Translation3d(t) * q.normalized(), {}});
-  }
-  std::stable_sort(poses.begin(), poses.end(), [](auto const& a, auto const& b) { return a.time < b.time; });
-  return poses;
-}
-
 LensCamera tum_intrinsics(fs::path const& folder, cv::Size size, std::vector<std::string>& warnings) {
   std::string const name = fs::absolute(folder).lexically_normal().string();
-  auto const named = [&](char const* long_name, char const* short_name) {
+  auto const is = [&](char const* long_name, char const* short_name) {
     return name.find(long_name) != std::string::npos || name.find(short_name) != std::string::npos;
   };
   LensCamera result;
@@ -191,11 +141,11 @@ LensCamera tum_intrinsics(fs::path const& folder, cv::Size size, std::vector<std
   auto const take = [&](std::string const& of, double fx, double fy, double cx, double cy, Lens lens) {
     whose = of, k[0] = fx, k[1] = fy, k[2] = cx, k[3] = cy, result.lens = lens;
   };
-  if (named("freiburg1", "fr1"))
+  if (is("freiburg1", "fr1"))
     take("freiburg1's", 517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633});
-  else if (named("freiburg2", "fr2"))
+  else if (is("freiburg2", "fr2"))
     take("freiburg2's", 520.9, 521.0, 325.1, 249.7, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172});
-  else if (named("freiburg3", "fr3"))
+  else if (is("freiburg3", "fr3"))
     take("freiburg3's", 535.4, 539.2, 320.1, 247.6, {});
   if (size != cv::Size(640, 480))
     fail(folder, "intrinsics are missing, and the pictures are not 640x480: write an rgbd.json");
@@ -212,10 +162,11 @@ RgbdSource read_tum(fs::path const& folder) {
   auto const colors = read_stamps(folder / "rgb.txt");
   auto const depths = read_stamps(folder / "depth.txt");
   fs::path const trajectory = folder / "groundtruth.txt";
-  std::optional<std::vector<StampedPose>> poses;
+  std::optional<std::vector<TrajectoryPose>> poses;
   if (fs::exists(trajectory)) {
     source.files.push_back(trajectory);
-    poses = read_trajectory(trajectory);
+    poses = read_tum_trajectory(trajectory);
+    std::stable_sort(poses->begin(), poses->end(), [](auto const& a, auto const& b) { return a.time < b.time; });
   }
   std::size_t no_depth = 0, no_pose = 0;
   std::vector<bool> taken(depths.size(), false);
@@ -236,8 +187,8 @@ RgbdSource read_tum(fs::path const& folder) {
         ++no_pose;
         continue;
       }
-      frame.pose = (*poses)[*pose].pose;
-      frame.problem = (*poses)[*pose].problem;
+      frame.pose = (*poses)[*pose].world_from_camera;
+      frame.problem = named(trajectory, (*poses)[*pose].problem);
     }
     taken[*depth] = true;
     frame.name = fmt::format("{:04d}", source.frames.size());
@@ -265,25 +216,6 @@ std::vector<fs::path> pictures_in(fs::path const& folder) {
   auto files = sorted_files(folder);
   std::erase_if(files, [](fs::path const& file) { return !is_picture(file); });
   return files;
-}
-
-/// Open3D's trajectory: blocks of "i j k" and a 4x4 matrix, world_from_camera. Whether they are poses is seen view by
-/// view.
-std::vector<Eigen::Matrix4d> read_log(fs::path const& path) {
-  auto const rows = table_of(path);
-  if (rows.size() % 5 != 0) fail(path, "a trajectory is blocks of 5 lines");
-  std::vector<Eigen::Matrix4d> matrices;
-  for (std::size_t block = 0; block < rows.size(); block += 5) {
-    Eigen::Matrix4d matrix;
-    for (std::size_t row = 0; row < 4; ++row) {
-      auto const& [line, words] = rows[block + 1 + row];
-      if (words.size() != 4) fail(path, fmt::format("line {} is not 4 numbers", line));
-      for (std::size_t col = 0; col < 4; ++col)
-        matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(col)) = any_number(words[col], path, line);
-    }
-    matrices.push_back(matrix);
-  }
-  return matrices;
 }
 
 LensCamera read_open3d_intrinsics(fs::path const& path) {
@@ -337,16 +269,13 @@ RgbdSource read_redwood(fs::path const& folder) {
   auto const preferred = std::find(logs.begin(), logs.end(), folder / "trajectory.log");
   fs::path const log = preferred != logs.end() ? *preferred : logs.front();
   if (preferred == logs.end() && logs.size() > 1) fail(folder, "several .log files, none of them trajectory.log");
-  auto const matrices = read_log(log);
-  if (matrices.size() != source.frames.size())
-    fail(log, fmt::format("{} poses for {} pictures", matrices.size(), source.frames.size()));
+  auto const poses = read_redwood_trajectory(log);
+  if (poses.size() != source.frames.size())
+    fail(log, fmt::format("{} poses for {} pictures", poses.size(), source.frames.size()));
   source.files.push_back(log);
-  for (std::size_t i = 0; i < matrices.size(); ++i) {
-    try {
-      source.frames[i].pose = pose_from_matrix(matrices[i], log, fmt::format("pose {}", i));
-    } catch (Error const& error) {
-      source.frames[i].problem = error.what();
-    }
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    source.frames[i].pose = poses[i].world_from_camera;
+    source.frames[i].problem = named(log, poses[i].problem);
   }
   return source;
 }

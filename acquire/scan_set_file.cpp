@@ -208,9 +208,9 @@ void read_images(fs::path const& folder, View& view) {
 
 fs::path view_folder(std::string const& view_name) { return fs::path("views") / view_name; }
 
-ScanSet read_manifest(fs::path const& folder) {
-  fs::path const path = folder / "scanset.json";
-  if (!fs::exists(path)) throw Error(ErrorCode::bad_input, folder, "is not a scan set (it has no scanset.json)");
+ScanSet read_manifest(fs::path const& given) {
+  fs::path const path = fs::is_regular_file(given) ? given : given / "scanset.json";
+  if (!fs::exists(path)) throw Error(ErrorCode::bad_input, given, "is not a scan set (it has no scanset.json)");
   Json const json = read_json(path);
   if (!json.is_object() || json.value("format", Json()) != kFormat)
     throw Error(ErrorCode::bad_input, path, fmt::format("is not a scan set of format {}", kFormat));

@@ -9,10 +9,10 @@
 
 namespace scanview {
 
-/// scanset.json alone: unit, centre, views with cameras and poses (their images empty), error budget. Everything is
-/// validated: unknown unit, missing or bad camera, non-finite or non-rigid pose, doubled or unsafe view name (a name is
-/// letters, digits, '_', '-', '.', not starting with '.') throw Error{bad_input}.
-ScanSet read_manifest(std::filesystem::path const& folder);
+/// scanset.json alone, which `path` is or lies in: unit, centre, views with cameras and poses (their images empty),
+/// error budget. Everything is validated: unknown unit, missing or bad camera, non-finite or non-rigid pose, doubled or
+/// unsafe view name (a name is letters, digits, '_', '-', '.', not starting with '.') throw Error{bad_input}.
+ScanSet read_manifest(std::filesystem::path const& path);
 /// Rewrites scanset.json (whole or not at all) from the set; images are left alone.
 void write_manifest(std::filesystem::path const& folder, ScanSet const& set);
 

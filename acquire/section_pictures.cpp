@@ -21,16 +21,6 @@ cv::Mat small(cv::Mat const& image, int interpolation) {
   return result;
 }
 
-/// The part of the picture that holds depths, with a margin: an object fills little of what its camera sees.
-cv::Rect interesting(RangeImage const& image) {
-  cv::Rect const all({0, 0}, image.depth.size());
-  cv::Mat1b const object = image.classes == static_cast<int>(PixelClass::object);
-  if (cv::countNonZero(object) == 0) return all;
-  cv::Rect box = cv::boundingRect(object);
-  int const margin = std::max(8, std::max(box.width, box.height) / 10);
-  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) & all;
-}
-
 /// Green around what has a depth.
 cv::Mat3b outlined(cv::Mat3b const& color, cv::Mat1b const& classes) {
   cv::Mat1b const object = classes == static_cast<int>(PixelClass::object);
@@ -92,6 +82,22 @@ cv::Mat3b class_picture(cv::Mat1b const& classes) {
 
 }  // namespace
 
+cv::Rect object_box(RangeImage const& image) {
+  cv::Rect const all({0, 0}, image.depth.size());
+  cv::Mat1b const object = image.classes == static_cast<int>(PixelClass::object);
+  if (cv::countNonZero(object) == 0) return all;
+  cv::Rect box = cv::boundingRect(object);
+  int const margin = std::max(8, std::max(box.width, box.height) / 10);
+  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) & all;
+}
+
+std::string color_swatch(cv::Vec3b const& color) {
+  return fmt::format(
+      "<span style=\"display:inline-block;width:1em;height:1em;border:1px solid "
+      "#888;background:rgb({},{},{})\"></span>",
+      color[2], color[1], color[0]);
+}
+
 Quantiles quantiles(cv::Mat1f const& values) {
   std::vector<float> finite;
   for (float const value : values)
@@ -107,7 +113,7 @@ Quantiles quantiles(cv::Mat1f const& values) {
 std::string view_row(View const& view, std::string const& unit) {
   auto const& image = view.image;
   auto const depth = quantiles(image.depth), sigma = quantiles(image.sigma);
-  cv::Rect const frame = interesting(image);
+  cv::Rect const frame = object_box(image);
   return html_row({html_jpeg(small(outlined(image.color(frame), image.classes(frame)), cv::INTER_AREA),
                              fmt::format("view {}", view.name), kWidth),
                    html_png(small(colored(image.depth(frame), depth.low, depth.high), cv::INTER_NEAREST),
@@ -119,13 +125,8 @@ std::string view_row(View const& view, std::string const& unit) {
 
 std::string class_legend(std::vector<ClassName> const& names) {
   std::string html = "<p>Mask: ";
-  for (auto const& [pixel, meaning] : names) {
-    cv::Vec3b const c = class_color(static_cast<std::uint8_t>(pixel));
-    html += fmt::format(
-        "<span style=\"display:inline-block;width:1em;height:1em;border:1px solid "
-        "#888;background:rgb({},{},{})\"></span> {} &nbsp; ",
-        c[2], c[1], c[0], meaning);
-  }
+  for (auto const& [pixel, meaning] : names)
+    html += fmt::format("{} {} &nbsp; ", color_swatch(class_color(static_cast<std::uint8_t>(pixel))), meaning);
   return html + "</p>\n";
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// How the report shows range images: shared by the sections of `import` and `acquire`.
+// How the report shows range images: shared by the sections of `import`, `acquire` and `register`.
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
@@ -15,6 +15,13 @@ struct Quantiles {
   double low = 0, middle = 0, high = 0;
 };
 Quantiles quantiles(cv::Mat1f const& values);
+
+/// The part of the picture that holds depths, with a margin: an object fills little of what its camera sees. All of it
+/// where there are none.
+cv::Rect object_box(RangeImage const& image);
+
+/// A small square of this colour (BGR), for legends.
+std::string color_swatch(cv::Vec3b const& color);
 
 /// One view as a row of figures: the picture with the outline of what has a depth, the depth (near blue, far red), what
 /// every pixel is, and sigma up to twice its median. Cropped to what has a depth.

@@ -76,10 +76,10 @@ struct Axis {
 
 constexpr char kStyle[] = R"(
 :root{color-scheme:light dark}
-body{font:16px/1.5 system-ui,sans-serif;max-width:1200px;margin:0 auto;padding:1rem;background:#fff;color:#1a1a1a}
+body{font:16px/1.5 system-ui,sans-serif;max-width:1200px;margin:0 auto;padding:1rem;background:#fff;color:#1a1a1a;overflow-wrap:break-word}
 h1{font-size:1.7rem;margin:.2em 0}h2{border-top:1px solid #ccc;padding-top:1rem;margin-top:2rem}
 nav a{margin-right:1em}figure{margin:0 .8rem .8rem 0;display:inline-block;vertical-align:top}
-img{max-width:100%;height:auto;display:block}figcaption{font-size:.8rem;color:#555}
+img{max-width:100%;height:auto;display:block}figcaption{font-size:.8rem;color:#555;overflow-wrap:anywhere}
 .row{display:flex;flex-wrap:wrap;align-items:flex-start}.scroll{overflow-x:auto}
 table{border-collapse:collapse;margin:.6rem 0;font-size:.9rem}td,th{padding:.15rem .7rem;border-bottom:1px solid #ddd;text-align:left}
 td.n,th.n{text-align:right}td.n{white-space:nowrap;font-variant-numeric:tabular-nums}.warning{background:#fff3cd;color:#5c4300;padding:.4rem .8rem;margin:.3rem 0}

@@ -174,4 +174,12 @@ Eigen::Isometry3d pose_from_matrix(Eigen::Matrix4d const& matrix, std::filesyste
   return pose;
 }
 
+Eigen::Isometry3d pose_from_quaternion(Eigen::Quaterniond const& target_from_source, Eigen::Vector3d const& translation,
+                                       std::filesystem::path const& path, std::string const& what) {
+  if (!translation.allFinite() || !target_from_source.coeffs().allFinite())
+    throw Error(ErrorCode::bad_input, path, what + " has a number that is not finite");
+  if (std::abs(target_from_source.norm() - 1) > 1e-2) throw Error(ErrorCode::bad_input, path, what + " is no rotation");
+  return Eigen::Translation3d(translation) * target_from_source.normalized();
+}
+
 }  // namespace scanview

@@ -64,5 +64,8 @@ Json pose_to_json(Eigen::Isometry3d const& pose);
 Eigen::Isometry3d pose_from_json(Json const& json, std::filesystem::path const& path, std::string const& what);
 Eigen::Isometry3d pose_from_matrix(Eigen::Matrix4d const& matrix, std::filesystem::path const& path,
                                    std::string const& what);
+/// A rotation and a translation; |q| may be off by a hundredth, as quaternions of few digits are. Errors as above.
+Eigen::Isometry3d pose_from_quaternion(Eigen::Quaterniond const& target_from_source, Eigen::Vector3d const& translation,
+                                       std::filesystem::path const& path, std::string const& what);
 
 }  // namespace scanview

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "cli/stages.h"
 #include "register/pose_file.h"
+#include "register/register_section.h"
 #include "viewer/blend/exposure.h"
 
 namespace scanview {
@@ -57,7 +58,9 @@ Json to_json(PoseComparison const& c) {
           {"max_length", c.max_length}};
 }
 
-Json figures_of(ScanSet const& set, Alignment const& alignment) {
+Json to_json(ErrorPart const& part) { return {{"rms", json_number(part.rms)}, {"p95", json_number(part.p95)}}; }
+
+Json figures_of(ScanSet const& set, Alignment const& alignment, AlignmentReview const& review) {
   auto const name = [&](std::size_t i) { return set.views[i].name; };
   Json figures = {{"pairs", Json::array()},
                   {"unobservable", alignment.unobservable},
@@ -69,7 +72,15 @@ Json figures_of(ScanSet const& set, Alignment const& alignment) {
                                 {"overlap", json_number(pair.overlap)},
                                 {"rms", json_number(pair.rms)},
                                 {"median_distance", json_number(pair.median_distance)},
-                                {"inliers", json_number(pair.inliers)}});
+                                {"inliers", json_number(pair.inliers)},
+                                {"suspicious", pair.suspicious}});
+  figures["worst_pair"] = nullptr;
+  if (PairFigures const* const worst = worst_pair(alignment))
+    figures["worst_pair"] = {{"a", name(worst->a)},
+                             {"b", name(worst->b)},
+                             {"rms", json_number(worst->rms)},
+                             {"median_distance", json_number(worst->median_distance)}};
+  figures["error"] = to_json(alignment.error);
   for (auto const& part : alignment.parts) {
     Json names = Json::array();
     for (std::size_t const i : part) names.push_back(name(i));
@@ -77,7 +88,8 @@ Json figures_of(ScanSet const& set, Alignment const& alignment) {
   }
   for (std::size_t i = 0; i < alignment.poses.size(); ++i)
     figures["poses"][name(i)] = {{"std_deg", json_number(alignment.poses[i].std_deg)},
-                                 {"std_length", json_number(alignment.poses[i].std_length)}};
+                                 {"std_length", json_number(alignment.poses[i].std_length)},
+                                 {"seen_by", json_number(review.seen[i])}};
   figures["iterations"] = alignment.iterations;
   figures["converged"] = alignment.status == AlignmentStatus::converged;
   return figures;
@@ -107,7 +119,8 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
   record.options["seed"] = context.seed;
   record.inputs["scanset.json#cameras"] = hash_bytes(cameras.dump());
   record.inputs["scanset.json#initial_poses"] = hash_bytes(initial.dump());
-  if (request.start == RegisterRequest::Start::file) record.inputs["init"] = hash_file(request.pose_file);
+  if (request.start == RegisterRequest::Start::file)
+    record.inputs["init"] = hash_file(find_pose_file(request.pose_file));
   // The manifest may have been put back to the initial poses: the record's inputs fit, but not what it vouches for.
   if (fs::exists(folder / "poses.json") &&
       read_json(folder / "poses.json").value("registered", Json()) != poses_json(manifest)) {
@@ -136,12 +149,13 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
     for (std::size_t i = 0; i < set.views.size(); ++i) set.views[i].gain = gains[i];
     write_json(folder / "poses.json", {{"initial", initial}, {"registered", poses_json(set)}});
     write_manifest(folder, set);
-    out.figures = figures_of(set, alignment);
+    AlignmentReview const reviewed = review_alignment(set, before, alignment, context);
+    out.figures = figures_of(set, alignment, reviewed);
     if (had_poses) out.figures["moved"] = to_json(compare_poses(set, after, before));
     if (alignment.status == AlignmentStatus::disconnected)
       out.figures["stage_exit"] = static_cast<int>(ErrorCode::partial);
     out.outputs["poses.json"] = hash_file(folder / "poses.json");
-    return register_section(set, before, alignment);
+    return register_section(set, before, alignment, reviewed);
   });
 }
 

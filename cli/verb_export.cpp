@@ -1,11 +1,13 @@
 #include <CLI/CLI.hpp>
+#include <array>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "acquire/export.h"
 #include "acquire/scan_set_file.h"
-#include "base/error.h"
 #include "cli/stages.h"
+#include "register/pose_file.h"
 
 namespace scanview {
 namespace {
@@ -20,6 +22,9 @@ void export_glb(std::filesystem::path const& path, std::filesystem::path const& 
   write_file(path, encode_glb(pointers, set, indices));
 }
 
+constexpr std::array kPoseFormats = {std::pair{"conf", PoseFormat::conf}, std::pair{"aln", PoseFormat::aln},
+                                     std::pair{"tum", PoseFormat::tum}, std::pair{"redwood", PoseFormat::redwood}};
+
 }  // namespace
 
 void add_export(CLI::App& app, Session& session) {
@@ -30,25 +35,29 @@ void add_export(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("export", "A scan set for other programs");
   verb->add_option("set", arguments->set, "The scan set")->required();
-  verb->add_option("--to", arguments->kind,
-                   "ply (merged coloured points), glb (all views' meshes), colmap (text model, depth maps), nerfstudio "
-                   "(transforms.json)")
+  verb->add_option(
+          "--to", arguments->kind,
+          "ply (merged coloured points), glb (all views' meshes), colmap (text model, depth maps), nerfstudio "
+          "(transforms.json); poses alone: conf (Stanford), aln (MeshLab, with the set's meshes), tum, redwood "
+          "(trajectories)")
       ->required()
-      ->check(CLI::IsMember({"ply", "glb", "colmap", "nerfstudio"}));
-  verb->add_option("-o,--output", arguments->output, "File (ply, glb) or folder")->required();
+      ->check(CLI::IsMember({"ply", "glb", "colmap", "nerfstudio", "conf", "aln", "tum", "redwood"}));
+  verb->add_option("-o,--output", arguments->output, "Folder (colmap, nerfstudio) or file (all others)")->required();
   verb->callback([arguments, &session] {
     session.verb = "export";
     session.work = [arguments, &session] {
       Context& context = session.context;
-      ScanSet const set = read_scan_set(arguments->set, context);
-      if (!set.has_poses())
-        throw Error(ErrorCode::bad_input, arguments->set, "has views without poses (run 'scanview register' first)");
+      ScanSet set = read_manifest(arguments->set);
+      require_poses(arguments->set, set);
+      session.report["views"] = set.views.size();
+      session.report["output"] = arguments->output.string();
+      for (auto const& [name, format] : kPoseFormats)
+        if (arguments->kind == name) return write_poses(arguments->output, format, set, arguments->set);
+      set = read_scan_set(arguments->set, context);
       if (arguments->kind == "ply") export_point_cloud(arguments->output, set, context);
       if (arguments->kind == "glb") export_glb(arguments->output, arguments->set, set, context);
       if (arguments->kind == "colmap") export_colmap(arguments->output, set, context);
       if (arguments->kind == "nerfstudio") export_nerfstudio(arguments->output, set, context);
-      session.report["views"] = set.views.size();
-      session.report["output"] = arguments->output.string();
     };
   });
 }

@@ -62,7 +62,9 @@ Json compare_with(std::filesystem::path const& folder, std::filesystem::path con
 
 void add_register_flags(CLI::App& verb, RegisterFlags& flags) {
   verb.add_option("--init", flags.init,
-                  "given, auto, none, turntable[:DEG[:AXIS]], or a file of poses or marks (default: given, else auto)");
+                  "given, auto, none, turntable[:DEG[:AXIS]], or a file (default: given, else auto): Stanford .conf, "
+                  "MeshLab .aln, TUM or Redwood trajectory, transforms.json, COLMAP's images.txt, scanset.json, "
+                  "rgbd.json, or the folder of one of these; or marks");
   verb.add_flag("--no-refine", flags.no_refine, "Take the initial poses as they are");
 }
 
@@ -105,7 +107,8 @@ void add_register(CLI::App& app, Session& session) {
   CLI::App* verb = app.add_subcommand("register", "Aligns the views of a scan set");
   verb->add_option("set", arguments->set, "The scan set")->required();
   add_register_flags(*verb, arguments->flags);
-  verb->add_option("--reference", arguments->reference, "Poses to compare the result with");
+  verb->add_option("--reference", arguments->reference,
+                   "Poses to compare the result with: a file (or its folder) as for --init");
   verb->add_flag("--force", arguments->force, "Also where nothing changed");
   verb->callback([arguments, &session] {
     session.verb = "register";

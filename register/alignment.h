@@ -4,7 +4,6 @@
 
 #include "acquire/scan_set.h"
 #include "base/context.h"
-#include "base/html.h"
 
 namespace scanview {
 
@@ -69,9 +68,5 @@ PoseComparison compare_poses(ScanSet const& set, std::vector<Eigen::Isometry3d> 
 /// Each pose against the reference after the one rigid motion that fits them best: the worst of all.
 PoseComparison compare_poses_absolute(ScanSet const& set, std::vector<Eigen::Isometry3d> const& poses,
                                       std::vector<Eigen::Isometry3d> const& reference);
-
-/// Cross-sections before and after, residuals a pair, the overlap graph, figures. `before` are the initial poses.
-ReportSection register_section(ScanSet const& set, std::vector<Eigen::Isometry3d> const& before,
-                               Alignment const& alignment);
 
 }  // namespace scanview

@@ -21,12 +21,8 @@ OneWay measure_one_way(RangeImage const& image, ViewSurface const& from, ViewSur
   for (SurfaceSample const& sample : from.samples) {
     ++result.asked;
     Eigen::Vector3d const raw = image.has_depth(sample.x, sample.y) ? image.point(sample.x, sample.y) : sample.point;
-    Eigen::Vector3d const p = to_from_from * raw;
-    SurfaceHit hit;
-    if (!look_up(to, p, hit)) continue;
-    if ((to_from_from.linear() * sample.normal).dot(hit.normal) < kMinNormalCosine) continue;
-    if (std::abs(p.z() - hit.point.z()) > gate) continue;
-    result.distances.push_back(static_cast<float>(hit.normal.dot(p - hit.point)));
+    auto const distance = distance_to_surface(to, to_from_from * raw, to_from_from.linear() * sample.normal, gate);
+    if (distance) result.distances.push_back(static_cast<float>(*distance));
   }
   return result;
 }
@@ -36,6 +32,15 @@ double share(std::size_t part, std::size_t whole) {
 }
 
 }  // namespace
+
+std::optional<double> distance_to_surface(ViewSurface const& to, Eigen::Vector3d const& point,
+                                          Eigen::Vector3d const& normal, double gate) {
+  SurfaceHit hit;
+  if (!look_up(to, point, hit)) return std::nullopt;
+  if (normal.dot(hit.normal) < kMinNormalCosine) return std::nullopt;
+  if (std::abs(point.z() - hit.point.z()) > gate) return std::nullopt;
+  return hit.normal.dot(point - hit.point);
+}
 
 std::vector<PairDistances> measure_pairs(ScanSet const& set, std::vector<SurfacePyramid> const& views,
                                          std::vector<ViewGraphEdge> const& edges,

@@ -11,7 +11,7 @@
 namespace scanview {
 namespace {
 
-constexpr std::size_t kLook = 120, kFit = 300, kJudge = 500;  // samples of a view
+constexpr std::size_t kLook = 120, kFit = 300, kJudge = 500, kCount = 2000;  // samples of a view
 constexpr double kLookGate = 0.05, kFitGate = 0.02;           // radii
 constexpr int kFitSteps = 6;
 constexpr std::size_t kTried = 8;        // poses of a block that are fitted
@@ -95,12 +95,28 @@ class Assembly {
     return sum;
   }
 
-  double judge(Cut const& cut, Eigen::Isometry3d const& move) const {
-    double sum = 0;
+  struct Judgement {
+    double score = 0;
+    double in_front = 0;  // samples far before what another view saw: no noise puts a surface there
+
+    // Symmetric surfaces fit alike either way; the few places that are not symmetric decide.
+    bool is_better_than(Judgement const& other) const {
+      if (score > std::max(kBetter * other.score, other.score + 1)) return true;
+      return score * kBetter > other.score && in_front + 3 * std::sqrt(in_front) + 3 < other.in_front;
+    }
+  };
+
+  Judgement judge(Cut const& cut, Eigen::Isometry3d const& move) const {
+    Judgement sum;
     for (std::size_t const a : cut.moving)
-      for (std::size_t const b : cut.staying)
-        sum += pose_score(views_[a], views_[b], b_from_a(a, b, move), options_.gate, options_.radius, kJudge,
-                          printed_[a] && printed_[b]);
+      for (std::size_t const b : cut.staying) {
+        Eigen::Isometry3d const pose = b_from_a(a, b, move);
+        sum.score += pose_score(views_[a], views_[b], pose, options_.gate, options_.radius, kJudge,
+                                printed_[a] && printed_[b]);
+        sum.in_front += static_cast<double>(
+            check_pose(level_of(views_[a], 1), level_of(views_[b], 1), pose, kLookGate * options_.radius, kCount)
+                .in_front);
+      }
     return sum;
   }
 
@@ -184,13 +200,15 @@ class Assembly {
     for (auto const& [cost, k] : looks)
       if (tried.size() <= kTried && -cost > kWorthALook * here) tried.push_back(moves[k]);
     if (tried.size() < 2) return false;
-    std::vector<double> scores(tried.size());
+    std::vector<Judgement> judged(tried.size());
     for_each_index(context_, tried.size(), [&](std::size_t k) {
       fit(cut, tried[k]);
-      scores[k] = judge(cut, tried[k]);
+      judged[k] = judge(cut, tried[k]);
     });
-    auto const best = static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
-    if (best == 0 || scores[best] < std::max(kBetter * scores[0], scores[0] + 1)) return false;
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < tried.size(); ++k)
+      if (judged[k].is_better_than(judged[best])) best = k;
+    if (best == 0) return false;
     for (std::size_t const view : cut.moving) poses_[view] = tried[best] * poses_[view];
     return true;
   }

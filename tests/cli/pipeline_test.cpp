@@ -1,6 +1,8 @@
 // From a synthetic scan to pictures: what the stages must reach together, and the sets that are hard.
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "acquire/scan_set_file.h"
 #include "base/files.h"
 #include "base/image_file.h"
@@ -24,6 +26,10 @@ TEST_F(Pipeline, ASyntheticScanComesBack) {
   Json const registered = run({"register", in("set"), "--reference", in("scan/truth/scanset.json")});
   Context context;
   double const size = 2 * read_scan_set(in("set"), context).radius();
+  for (auto const& pair : registered["pairs"])
+    EXPECT_LE(pair["median_distance"].get<double>(), registered["worst_pair"]["median_distance"].get<double>());
+  EXPECT_GT(registered["poses"]["000"]["seen_by"].get<double>(), 0.5);
+  EXPECT_GT(registered["error"]["p95"].get<double>(), registered["error"]["rms"].get<double>());
   EXPECT_LE(registered["reference"]["median_deg"].get<double>(), 0.05);
   EXPECT_LE(registered["reference"]["median_length"].get<double>(), 1e-3 * size);
 
@@ -89,6 +95,30 @@ TEST_F(Pipeline, ExportsComeBack) {
        {"set", "set/scanset.json", "set/mesh.json", "set/views/000/range.exr", "set/views/000/color.png",
         "set/views/000/mesh.ply", "set/views/000/mesh.glb", "nerfstudio/transforms.json", "colmap"})
     EXPECT_TRUE(run({"info", in(name)}).contains("kind")) << name;
+}
+
+TEST_F(Pipeline, PosesComeBack) {
+  run({"synth", "statuette", "--pattern", "range", "-o", in("set"), "--views", "12", "--size", "120x90"});
+  run({"mesh", in("set")});
+  for (char const* kind : {"conf", "aln", "tum", "redwood"}) {
+    std::string const poses = in(std::string("poses.") + kind);
+    run({"export", in("set"), "--to", kind, "-o", poses});
+    Json const reference = run({"register", in("set"), "--init", poses, "--no-refine", "--reference",
+                                in("set/truth/scanset.json")})["reference"];
+    EXPECT_LE(reference["pose_max_deg"].get<double>(), 1e-5) << kind;
+    EXPECT_LE(reference["pose_max_length"].get<double>(), 1e-9) << kind;
+  }
+  // What the alignment names is there: MeshLab opens it.
+  std::istringstream aln(read_file(in("poses.aln")));
+  std::string count, mesh;
+  std::getline(aln, count);
+  std::getline(aln, mesh);
+  EXPECT_TRUE(fs::exists(in(mesh))) << mesh;
+  for (char const* kind : {"colmap", "nerfstudio"}) run({"export", in("set"), "--to", kind, "-o", in(kind)});
+  for (char const* file : {"colmap", "nerfstudio", "nerfstudio/transforms.json", "colmap/sparse/images.txt"}) {
+    Json const report = run({"register", in("set"), "--no-refine", "--reference", in(file)});
+    EXPECT_LE(report["reference"]["max_deg"].get<double>(), 1e-5) << file;
+  }
 }
 
 }  // namespace

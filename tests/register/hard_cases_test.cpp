@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "range_scene.h"
 #include "register/alignment.h"
+#include "register/register_section.h"
 
 namespace scanview {
 namespace {
@@ -141,14 +142,78 @@ TEST(Align, RefusesWhatItCannotStartFrom) {
   EXPECT_THROW(bad.validate(), Error);
 }
 
-TEST(RegisterSection, ShowsTheViewsItIsGiven) {
+std::size_t count_of(std::string const& part, std::string const& text) {
+  std::size_t count = 0;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+TEST(RegisterSection, ShowsTheViewsItIsGivenAndNamesTheWorstPair) {
   ScanSet set = scene::ring(scene::blob(), 4, -1.2, Noise{0.003, 0, 0, 3});
+  set.views[2].name = "a_view_with_a_name_that_is_as_long_as_a_folder_of_some_scanner_makes_it_2026";
   Context context;
   Alignment const got = align(set, {}, context);
-  ReportSection const section = register_section(set, scene::poses_of(set), got);
-  EXPECT_THAT(section.html, ::testing::HasSubstr("<img"));
+  auto const before = scene::poses_of(set);
+  AlignmentReview const review = review_alignment(set, before, got, context);
+  ReportSection const section = register_section(set, before, got, review);
+  // Two cross-sections, graph, matrix, and the four views.
+  EXPECT_EQ(count_of("<img", section.html), 8U);
   EXPECT_THAT(section.html, ::testing::HasSubstr("003"));
   EXPECT_THAT(section.html, ::testing::Not(::testing::HasSubstr("nan")));
+  PairFigures const* const worst = worst_pair(got);
+  ASSERT_NE(worst, nullptr);
+  for (PairFigures const& pair : got.pairs) EXPECT_LE(pair.median_distance, worst->median_distance);
+  EXPECT_THAT(section.html, ::testing::HasSubstr("The worst pair is " + set.views[worst->a].name + " and " +
+                                                 set.views[worst->b].name + ": median distance "));
+}
+
+TEST(RegisterSection, AViewAloneAndViewsApartAreShown) {
+  ScanSet set = scene::ring(scene::blob(), 2, 0, Noise{0.002, 0, 0, 3});  // opposite sides
+  Context context;
+  for (std::size_t const views : {2U, 1U}) {
+    set.views.resize(views);
+    Alignment const got = align(set, {}, context);
+    AlignmentReview const review = review_alignment(set, scene::poses_of(set), got, context);
+    ReportSection const section = register_section(set, scene::poses_of(set), got, review);
+    EXPECT_EQ(worst_pair(got), nullptr);
+    EXPECT_LT(review.seen[0], 0.02);
+    EXPECT_THAT(section.html, ::testing::HasSubstr(views == 2 ? "fall into 2 parts" : "nothing to align"));
+    EXPECT_THAT(section.html, ::testing::Not(::testing::HasSubstr("nan")));
+    EXPECT_EQ(count_of("<img", section.html), views == 2 ? 4U : 1U);
+  }
+}
+
+TEST(RegisterSection, ManyViewsShowThoseThatOthersSeeLeast) {
+  ScanSet set;
+  Alignment alignment;
+  ScanSet const ring = scene::ring(scene::blob(), 2, 0, Noise{0.002, 0, 0, 3});
+  for (std::size_t i = 0; i < 30; ++i) {  // all from the first side but one
+    set.views.push_back(ring.views[i == 17 ? 1 : 0]);
+    set.views.back().name = std::to_string(1000 + i);
+    for (std::size_t k = 0; k < i; ++k)
+      if (i != 17 && k != 17) alignment.pairs.push_back({k, i, 1, 0.01, 0.001 * static_cast<double>(k), 1, false});
+    alignment.parts = {{0}};
+  }
+  alignment.object_from_camera = scene::poses_of(set);
+  alignment.poses.resize(30);
+  Context context;
+  AlignmentReview const review = review_alignment(set, alignment.object_from_camera, alignment, context);
+  EXPECT_LT(review.seen[17], 0.02);
+  EXPECT_GT(review.seen[0], 0.95);
+  ASSERT_EQ(review.observers.size(), 24U);
+  EXPECT_EQ(std::count_if(review.observers.begin(), review.observers.end(),
+                          [](Observers const& one) { return one.view == 17; }),
+            1);
+  // 28 others stand at the very same place.
+  Observers const& first = review.observers.front();
+  EXPECT_EQ(
+      cv::countNonZero(first.counts == 28) + cv::countNonZero(first.counts == -1) + cv::countNonZero(first.counts == 0),
+      static_cast<int>(first.counts.total()));
+  ReportSection const section = register_section(set, alignment.object_from_camera, alignment, review);
+  EXPECT_EQ(count_of("<img", section.html), 28U);
+  EXPECT_EQ(count_of("<tr>", section.html), 2 + 60 + 30U);
+  EXPECT_THAT(section.html, ::testing::HasSubstr("The 24 of 30 views"));
+  EXPECT_THAT(section.html, ::testing::HasSubstr("The 60 worst of 406 pairs"));
 }
 
 }  // namespace
