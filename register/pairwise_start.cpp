@@ -14,6 +14,8 @@ namespace scanview {
 namespace {
 
 constexpr double kMostDeviations = 15;  // of the given poses: farther away nothing is looked for
+constexpr double kNearby = 0.1;         // of the radius: where a start needs projection only
+constexpr std::size_t kMostViews = 60;  // among which pairs are tested against all the others
 constexpr double kAgainst = 0.05;       // of the radius: poses against a firm pair
 constexpr double kPairAccuracy = 0.01;  // of the radius: what a pairwise motion may be off
 
@@ -64,19 +66,29 @@ Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features
                       double radius, double reach, std::uint64_t seed, std::size_t views) {
   MatchOptions const options = cost_options(radius);
   std::vector<Eigen::Isometry3d> candidates{start};
-  IcpOptions icp;
-  icp.radius = radius;
-  ViewSurface const &coarse_a = level_of(a, 2), &coarse_b = level_of(b, 2);
-  candidates.push_back(pairwise_icp(coarse_a, coarse_b, start, icp).b_from_a);
-  FeatureMotionOptions feature_options;
-  feature_options.threshold = 0.02 * radius;
-  feature_options.seed = seed;
-  feature_options.item = edge.a * views + edge.b;
-  FeatureMotion const by_features = match_features(features_a, features_b, feature_options);
-  if (by_features.found) {
-    candidates.push_back(by_features.b_from_a);
-    icp.first_distance = 0.1;
-    candidates.push_back(pairwise_icp(coarse_a, coarse_b, by_features.b_from_a, icp).b_from_a);
+  PairSearchOptions search;
+  search.radius = radius;
+  PairPose found = search_pair(a, b, {}, {start}, search);
+  // From nearby projection finds the pose alone, and so much faster than anything else does.
+  bool const is_near = found.verdict == PairPose::Verdict::firm &&
+                       motion_difference(found.b_from_a, start, a.centroid, radius) < kNearby * radius;
+  if (is_near) {
+    candidates.push_back(found.b_from_a);
+  } else {
+    IcpOptions icp;
+    icp.radius = radius;
+    ViewSurface const &coarse_a = level_of(a, 2), &coarse_b = level_of(b, 2);
+    candidates.push_back(pairwise_icp(coarse_a, coarse_b, start, icp).b_from_a);
+    FeatureMotionOptions feature_options;
+    feature_options.threshold = 0.02 * radius;
+    feature_options.seed = seed;
+    feature_options.item = edge.a * views + edge.b;
+    FeatureMotion const by_features = match_features(features_a, features_b, feature_options);
+    if (by_features.found) {
+      candidates.push_back(by_features.b_from_a);
+      icp.first_distance = 0.1;
+      candidates.push_back(pairwise_icp(coarse_a, coarse_b, by_features.b_from_a, icp).b_from_a);
+    }
   }
   std::size_t const plain = candidates.size();
   for (std::size_t k = 0; k < plain; ++k) candidates.push_back(polish(a, b, candidates[k], options));
@@ -89,9 +101,7 @@ Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, Features
     best.b_from_a = candidate;
   }
   // Far off, each of these may have stopped at a wrong place.
-  PairSearchOptions search;
-  search.radius = radius;
-  PairPose found = search_pair(a, b, {}, {best.b_from_a}, search);
+  if (!is_near) found = search_pair(a, b, {}, {best.b_from_a}, search);
   if (found.verdict != PairPose::Verdict::firm) {
     ShapeFeatureOptions shape;
     shape.radius = radius;
@@ -157,6 +167,13 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
       "register: pairs");
   problem.pairs.clear();
   for (Measured const& one : measured) problem.pairs.push_back(one.pair);
+  for (std::size_t const k : n <= kMostViews ? find_false_pairs(problem) : std::vector<std::size_t>{}) {
+    context.log("the pair of " + set.views[measured[k].pair.a].name + " and " + set.views[measured[k].pair.b].name +
+                " is dropped: the others contradict it");
+    measured[k].pair.information.setZero();
+    measured[k].is_firm = false;
+    problem.pairs[k] = measured[k].pair;
+  }
   // Firm pairs first: a mean cost prefers surfaces that cover each other to those that coincide.
   struct Price {
     int against = 0;  // firm pairs
