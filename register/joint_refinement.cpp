@@ -4,6 +4,7 @@
 #include <ceres/rotation.h>
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -252,6 +253,19 @@ JointSpectrum joint_spectrum(JointProblem const& problem) {
   Eigen::MatrixXd information(count, count);
   for (Eigen::Index r = 0; r < count; ++r)
     for (Eigen::Index c = 0; c < count; ++c) information(r, c) = all(variables[r], variables[c]);
+  auto const put_covariance = [&](Eigen::MatrixXd const& covariance) {
+    for (Eigen::Index r = 0; r < count; ++r)
+      for (Eigen::Index c = 0; c < count; ++c) result.covariance(variables[r], variables[c]) = covariance(r, c);
+  };
+  // Where no eigenvalue can lie below the threshold, which a Cholesky decomposition tells, none need be known: of 200
+  // views that is several times faster.
+  double const bound = information.cwiseAbs().rowwise().sum().maxCoeff();
+  double const surely_held = std::max(kFreeEigenvalue * bound, 1.0 / std::pow(kFreeDeviation * problem.radius, 2));
+  Eigen::MatrixXd const identity = Eigen::MatrixXd::Identity(count, count);
+  if (Eigen::LLT<Eigen::MatrixXd>(information - surely_held * identity).info() == Eigen::Success) {
+    put_covariance(information.llt().solve(identity));
+    return result;
+  }
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> const spectrum(information);
   double const least =
       std::max(kFreeEigenvalue * spectrum.eigenvalues()[count - 1], 1.0 / std::pow(kFreeDeviation * problem.radius, 2));
@@ -263,8 +277,7 @@ JointSpectrum joint_spectrum(JointProblem const& problem) {
   Eigen::MatrixXd const rest = spectrum.eigenvectors().rightCols(count - free);
   Eigen::MatrixXd const covariance =
       rest * spectrum.eigenvalues().tail(count - free).cwiseInverse().asDiagonal() * rest.transpose();
-  for (Eigen::Index r = 0; r < count; ++r)
-    for (Eigen::Index c = 0; c < count; ++c) result.covariance(variables[r], variables[c]) = covariance(r, c);
+  put_covariance(covariance);
   return result;
 }
 
