@@ -12,11 +12,6 @@ constexpr double kMinToneCosine = 0.35;  // beyond, the texture is smeared
 constexpr double kMaxCorrelation = 0.8;  // beyond, it is misalignment that neighbours share, not noise
 constexpr double kToneGate = 3.0;        // of `cost`, in scales
 
-double tukey_weight(double residual_in_scales) {
-  double const t = residual_in_scales / kTukey;
-  return std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
-}
-
 // One view's contributions to the form, as they are summed up sample by sample.
 struct Sums {
   Matrix6d shape = Matrix6d::Zero(), tone = Matrix6d::Zero();
@@ -208,6 +203,11 @@ bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p, SurfaceHit& h
   hit.sigma = surface.sigma(y, x);
   hit.crease = surface.crease(y, x) != 0;
   return true;
+}
+
+double tukey_weight(double residual_in_scales) {
+  double const t = residual_in_scales / kTukey;
+  return std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
 }
 
 double robust_scale(std::vector<float>& values) {
