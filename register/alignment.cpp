@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "register/alignment_figures.h"
 #include "register/joint_refinement.h"
+#include "register/pair_search.h"
 #include "register/pairwise_start.h"
 #include "register/search_start.h"
 #include "register/turntable.h"
@@ -25,7 +26,14 @@ constexpr double kSettledStep = 0.1;                                    // of a 
 constexpr std::size_t kSamplesOfSet = 6000000, kPairSamples = 6000000;  // memory and time of a round
 constexpr std::size_t kFewSamples = 6000;                               // of a pair, while poses still move
 constexpr double kSharedErrors = 0.3;  // correlation of neighbouring samples: more of them tell nothing new
-constexpr int kScaleRounds = 4;        // of a level, in which scales, gates and neighbours are still measured
+constexpr std::size_t kManyViews = 60, kEdgesOfMany = 12;  // of so many, each is matched with its nearest only
+constexpr int kReturns = 3;                                // of what nothing holds to where it was told to be
+constexpr double kReturned = 0.02;                         // of a pixel
+constexpr int kScaleRounds = 4;  // of a level, in which scales, gates and neighbours are still measured
+// Of pairs that are right, contradictions stay below 0.15 and misfits below 4 (pair_search.cpp).
+constexpr double kMostContradiction = 0.2, kMostMisfit = 4;
+constexpr double kSurelyTorn = 10;  // mean square of a pair's wish in its deviations: chance does not give that
+constexpr double kContradictionGate = 0.03;  // radii
 
 // What one linearisation measured over all pairs; the next one weighs by it.
 struct Scales {
@@ -43,8 +51,10 @@ class Aligner {
     prepare();
     initial_poses();
     if (options_.refine && set_.views.size() > 1) {
+      std::vector<Eigen::Isometry3d> const told = problem_.object_from_camera;
       if (!has_searched_) start_from_neighbours();
       refine();
+      for (int round = 0; round < kReturns && !has_searched_ && return_along_free_motions(told); ++round) refine();
     } else {
       update_graph(0, 0.1 * radius_);
       problem_.fixed = fixed_views();
@@ -143,6 +153,7 @@ class Aligner {
     match.radius = radius_;
     match.max_samples = 3000;
     graph_ = build_view_graph(surfaces, problem_.object_from_camera, options_.min_overlap, match, context_);
+    if (views_.size() > kManyViews) graph_.edges = strongest_edges(views_.size(), graph_.edges, kEdgesOfMany);
   }
 
   // The first view of every part stays.
@@ -342,6 +353,28 @@ class Aligner {
     }
   }
 
+  // Starts by pairs move views along what nothing holds as well. Such motions go back to where they were told to be;
+  // what is held has then to be refined anew, since turns are not linear. Whether anything moved.
+  bool return_along_free_motions(std::vector<Eigen::Isometry3d> const& told) {
+    JointSpectrum const spectrum = joint_spectrum(problem_);
+    if (graph_.edges.empty() || spectrum.free_motions.cols() == 0) return false;
+    Eigen::VectorXd back = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * views_.size()));
+    for (auto const& part : graph_.parts) {
+      Eigen::Isometry3d const moved = problem_.object_from_camera[part.front()] * told[part.front()].inverse();
+      for (std::size_t i : part)
+        back.segment<6>(static_cast<Eigen::Index>(6 * i)) =
+            twist_of(problem_.object_from_camera[i].inverse() * moved * told[i], views_[i].centroid, radius_);
+    }
+    back = (spectrum.free_motions * (spectrum.free_motions.transpose() * back)).eval();
+    double largest = 0;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      Vector6d const twist = back.segment<6>(static_cast<Eigen::Index>(6 * i));
+      largest = std::max(largest, twist.norm());
+      problem_.object_from_camera[i] = problem_.object_from_camera[i] * motion(twist, views_[i].centroid, radius_);
+    }
+    return largest > kReturned * median_pixel(0);
+  }
+
   std::string name(std::size_t view) const { return set_.views[view].name; }
 
   void figures() {
@@ -373,27 +406,51 @@ class Aligner {
     judge_parts();
   }
 
+  // Do the views say that they are not of one surface? For pairs that nothing else can be compared with.
+  bool contradict(PairFigures const& pair, PairForm const& form) const {
+    std::vector<float> in_sigmas = form.geometry.values;
+    if (!(robust_scale(in_sigmas) > kMostMisfit)) return false;
+    std::size_t const level = std::min<std::size_t>(1, coarsest_);
+    Eigen::Isometry3d const b_from_a =
+        problem_.object_from_camera[pair.b].inverse() * problem_.object_from_camera[pair.a];
+    return check_pose(surface(pair.a, level), surface(pair.b, level), b_from_a, kContradictionGate * radius_,
+                      kFewSamples)
+               .contradiction() > kMostContradiction;
+  }
+
   // A pair is suspicious whose residual, or whose wish to move against what all pairs agreed on, is far above the
-  // others'.
+  // others', or whose views contradict each other.
   void judge_pairs(std::vector<PairForm> const& forms) {
+    for (std::size_t e = 0; e < forms.size(); ++e) {
+      PairFigures& pair = result_.pairs[e];
+      if (!contradict(pair, forms[e])) continue;
+      pair.suspicious = true;
+      context_.warn(
+          fmt::format("views {} and {} do not fit: each stands before what the other saw", name(pair.a), name(pair.b)));
+    }
     if (forms.size() < 3) return;
-    std::vector<double> residuals, wishes;
+    std::vector<double> residuals, wishes, squares;  // wishes in units, and in their deviations squared
     for (std::size_t e = 0; e < forms.size(); ++e) {
       residuals.push_back(result_.pairs[e].median_distance);
       Matrix6d information = forms[e].information;
       information.diagonal().array() += 1e-4 * information.trace() + 1e-300;
-      wishes.push_back(information.ldlt().solve(forms[e].gradient).norm());
+      Vector6d const wish = information.ldlt().solve(forms[e].gradient);
+      wishes.push_back(wish.norm());
+      squares.push_back(wish.dot(forms[e].gradient) / 6);
     }
-    auto const median = [](std::vector<double> values) {
-      auto const middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-      std::nth_element(values.begin(), middle, values.end());
-      return *middle;
+    // The lower quartile: one wrong view of a few has half of the pairs.
+    auto const usual = [](std::vector<double> values) {
+      auto const quarter = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 4);
+      std::nth_element(values.begin(), quarter, values.end());
+      return *quarter;
     };
-    double const usual_residual = median(residuals), usual_wish = median(wishes);
+    double const usual_residual = usual(residuals), usual_wish = usual(wishes);
     for (std::size_t e = 0; e < forms.size(); ++e) {
       PairFigures& pair = result_.pairs[e];
+      if (pair.suspicious) continue;
       bool const far = residuals[e] > 3 * usual_residual && residuals[e] > 1e-3 * radius_;
-      bool const torn = wishes[e] > 6 * usual_wish && wishes[e] > 0.02 * radius_;
+      bool const torn =
+          wishes[e] > 6 * usual_wish && wishes[e] > 0.02 * radius_ && squares[e] > kSurelyTorn;
       pair.suspicious = far || torn;
       if (far)
         context_.warn(fmt::format("views {} and {} do not fit: median distance {:.3g} {}, of all pairs {:.3g}",

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "base/parallel.h"
@@ -19,9 +20,14 @@ constexpr double kWorthALook = 0.3;      // of what the block reaches where it i
 constexpr double kSameMotion = 0.08;     // radii
 constexpr double kBetter = 1.03;         // a move must gain more than chance of few samples gives
 constexpr int kSweeps = 3;
+constexpr double kOtherPose = 10;  // degrees: less may be the same minimum
 
 ViewSurface const& level_of(SurfacePyramid const& view, std::size_t level) {
   return view.levels[std::min(level, view.levels.size() - 1)];
+}
+
+double turn_deg(Eigen::Isometry3d const& motion) {
+  return std::abs(Eigen::AngleAxisd(motion.linear()).angle()) * 180 / std::numbers::pi;
 }
 
 class Assembly {
@@ -32,7 +38,7 @@ class Assembly {
     for (SurfacePyramid const& view : views) printed_.push_back(has_print(view));
   }
 
-  std::size_t run(std::vector<std::pair<std::size_t, std::size_t>> const& tree) {
+  std::vector<AmbiguousBlock> run(std::vector<std::pair<std::size_t, std::size_t>> const& tree) {
     std::set<std::size_t> part;
     for (auto const& [a, b] : tree) part.insert({a, b});
     std::vector<std::vector<std::size_t>> blocks;
@@ -42,13 +48,14 @@ class Assembly {
       std::vector<std::size_t> const side = smaller_side(tree, cut, part.size());
       if (side.size() > 1) blocks.push_back(side);
     }
-    std::size_t moves = 0;
+    std::vector<AmbiguousBlock> ambiguous;
     for (int sweep = 0; sweep < kSweeps; ++sweep) {
-      std::size_t const before = moves;
-      for (auto const& block : blocks) moves += improve({block, rest_of(part, block)}) ? 1 : 0;
-      if (moves == before) break;
+      ambiguous.clear();
+      std::size_t moves = 0;
+      for (auto const& block : blocks) moves += improve({block, rest_of(part, block)}, ambiguous) ? 1 : 0;
+      if (moves == 0) break;
     }
-    return moves;
+    return ambiguous;
   }
 
  private:
@@ -188,7 +195,7 @@ class Assembly {
     return moves;
   }
 
-  bool improve(Cut const& cut) {
+  bool improve(Cut const& cut, std::vector<AmbiguousBlock>& ambiguous) {
     context_.check_cancelled();
     std::vector<Eigen::Isometry3d> moves = proposals(cut);
     if (moves.empty()) return false;
@@ -208,7 +215,15 @@ class Assembly {
     std::size_t best = 0;
     for (std::size_t k = 1; k < tried.size(); ++k)
       if (judged[k].is_better_than(judged[best])) best = k;
-    if (best == 0) return false;
+    if (best == 0) {
+      for (std::size_t k = 1; k < tried.size(); ++k) {
+        double const turn = turn_deg(tried[k] * tried[0].inverse());
+        if (turn < kOtherPose || judged[0].is_better_than(judged[k])) continue;
+        ambiguous.push_back({cut.moving, turn});
+        break;
+      }
+      return false;
+    }
     for (std::size_t const view : cut.moving) poses_[view] = tried[best] * poses_[view];
     return true;
   }
@@ -223,10 +238,11 @@ class Assembly {
 
 }  // namespace
 
-std::size_t improve_assembly(std::vector<SurfacePyramid> const& views, std::vector<PairHypotheses> const& hypotheses,
-                             std::vector<std::pair<std::size_t, std::size_t>> const& tree,
-                             AssemblyOptions const& options, std::vector<Eigen::Isometry3d>& object_from_camera,
-                             Context& context) {
+std::vector<AmbiguousBlock> improve_assembly(std::vector<SurfacePyramid> const& views,
+                                             std::vector<PairHypotheses> const& hypotheses,
+                                             std::vector<std::pair<std::size_t, std::size_t>> const& tree,
+                                             AssemblyOptions const& options,
+                                             std::vector<Eigen::Isometry3d>& object_from_camera, Context& context) {
   return Assembly(views, hypotheses, options, object_from_camera, context).run(tree);
 }
 

@@ -4,10 +4,12 @@
 #include <ceres/rotation.h>
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numeric>
 
@@ -16,6 +18,10 @@ namespace {
 
 constexpr double kFreeEigenvalue = 1e-8;  // of the largest
 constexpr double kFreeDeviation = 0.05;   // of the radius
+constexpr double kFalse = 10;             // mean square of a false pair: of 10^5 right ones chance gives one 6
+constexpr double kInseparable = 0.8;      // share of the worst's that another pair has if either may be wrong
+constexpr double kControlled = 0.02;      // share of a pair's error along a motion that the others must show
+constexpr double kHeldDeviation = 1e-6;   // of the radius: free motions while the rest is solved
 
 using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 
@@ -156,6 +162,55 @@ Matrix6d belief_factor(JointSpectrum const& spectrum, std::size_t view, double s
   return factor;
 }
 
+// Keeps the free motions at rest while the rest is solved. Taken out afterwards only, they would have run far (little
+// noise moves what nothing holds) and the rest with them, since turns are not linear.
+class FreeMotionCost : public ceres::CostFunction {
+ public:
+  FreeMotionCost(Eigen::MatrixXd const& free_motions, double std) : rows_(free_motions.transpose() / std) {
+    set_num_residuals(static_cast<int>(rows_.rows()));
+    for (Eigen::Index i = 0; i < rows_.cols() / 6; ++i) mutable_parameter_block_sizes()->push_back(6);
+  }
+  bool Evaluate(double const* const* twists, double* residuals, double** jacobians) const override {
+    Eigen::Map<Eigen::VectorXd> sum(residuals, rows_.rows());
+    sum.setZero();
+    for (Eigen::Index i = 0; i < rows_.cols() / 6; ++i) {
+      auto const own = rows_.middleCols<6>(6 * i);
+      sum += own * Eigen::Map<Vector6d const>(twists[i]);
+      if (jacobians != nullptr && jacobians[i] != nullptr)
+        Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>>(jacobians[i], rows_.rows(), 6) = own;
+    }
+    return true;
+  }
+
+ private:
+  Eigen::MatrixXd rows_;
+};
+
+// What a pair is off the balance, in the deviations that its own error leaves there, squared, by the number of motions
+// that the other pairs control; 0 where they control none.
+double mean_square_against_others(JointProblem const& problem, JointSpectrum const& spectrum,
+                                  PairMeasurement const& pair) {
+  SquareRoot const root = square_root(pair.information, pair.gradient);
+  Eigen::Isometry3d const b_from_a = problem.object_from_camera[pair.b].inverse() * problem.object_from_camera[pair.a];
+  Vector6d const off =
+      root.factor * twist_of(b_from_a * pair.b_from_a.inverse(), pair.center, problem.radius) + root.offset;
+  auto const a = static_cast<Eigen::Index>(6 * pair.a), b = static_cast<Eigen::Index>(6 * pair.b);
+  Eigen::Matrix<double, 12, 12> covariance;
+  covariance << spectrum.covariance.block<6, 6>(a, a), spectrum.covariance.block<6, 6>(a, b),
+      spectrum.covariance.block<6, 6>(b, a), spectrum.covariance.block<6, 6>(b, b);
+  Matrix6x12 const d = root.factor * pair_derivative(problem, pair);
+  Eigen::SelfAdjointEigenSolver<Matrix6d> const left(Matrix6d::Identity() - d * covariance * d.transpose());
+  double sum = 0;
+  int motions = 0;
+  for (int k = 0; k < 6; ++k) {
+    bool const measured = (root.factor.transpose() * left.eigenvectors().col(k)).squaredNorm() > 0;
+    if (!measured || left.eigenvalues()[k] < kControlled) continue;
+    sum += std::pow(left.eigenvectors().col(k).dot(off), 2) / left.eigenvalues()[k];
+    ++motions;
+  }
+  return motions > 0 ? sum / motions : 0;
+}
+
 std::string direction_text(Eigen::Vector3d direction) {
   Eigen::Index largest = 0;
   direction.cwiseAbs().maxCoeff(&largest);
@@ -198,6 +253,19 @@ JointSpectrum joint_spectrum(JointProblem const& problem) {
   Eigen::MatrixXd information(count, count);
   for (Eigen::Index r = 0; r < count; ++r)
     for (Eigen::Index c = 0; c < count; ++c) information(r, c) = all(variables[r], variables[c]);
+  auto const put_covariance = [&](Eigen::MatrixXd const& covariance) {
+    for (Eigen::Index r = 0; r < count; ++r)
+      for (Eigen::Index c = 0; c < count; ++c) result.covariance(variables[r], variables[c]) = covariance(r, c);
+  };
+  // Where no eigenvalue can lie below the threshold, which a Cholesky decomposition tells, none need be known: of 200
+  // views that is several times faster.
+  double const bound = information.cwiseAbs().rowwise().sum().maxCoeff();
+  double const surely_held = std::max(kFreeEigenvalue * bound, 1.0 / std::pow(kFreeDeviation * problem.radius, 2));
+  Eigen::MatrixXd const identity = Eigen::MatrixXd::Identity(count, count);
+  if (Eigen::LLT<Eigen::MatrixXd>(information - surely_held * identity).info() == Eigen::Success) {
+    put_covariance(information.llt().solve(identity));
+    return result;
+  }
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> const spectrum(information);
   double const least =
       std::max(kFreeEigenvalue * spectrum.eigenvalues()[count - 1], 1.0 / std::pow(kFreeDeviation * problem.radius, 2));
@@ -209,8 +277,7 @@ JointSpectrum joint_spectrum(JointProblem const& problem) {
   Eigen::MatrixXd const rest = spectrum.eigenvectors().rightCols(count - free);
   Eigen::MatrixXd const covariance =
       rest * spectrum.eigenvalues().tail(count - free).cwiseInverse().asDiagonal() * rest.transpose();
-  for (Eigen::Index r = 0; r < count; ++r)
-    for (Eigen::Index c = 0; c < count; ++c) result.covariance(variables[r], variables[c]) = covariance(r, c);
+  put_covariance(covariance);
   return result;
 }
 
@@ -273,6 +340,17 @@ JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum
                        problem.radius, belief_factor(spectrum, i, problem.belief_std)};
     ceres_problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BeliefCost, 6, 6>(cost), nullptr, twists[i].data());
   }
+  if (spectrum.free_motions.cols() > 0 && ceres_problem.NumResidualBlocks() > 0) {
+    std::vector<double*> blocks;
+    for (std::size_t i = 0; i < n; ++i) {
+      blocks.push_back(twists[i].data());
+      if (ceres_problem.HasParameterBlock(twists[i].data())) continue;
+      ceres_problem.AddParameterBlock(twists[i].data(), 6);
+      ceres_problem.SetParameterBlockConstant(twists[i].data());
+    }
+    ceres_problem.AddResidualBlock(new FreeMotionCost(spectrum.free_motions, kHeldDeviation * problem.radius), nullptr,
+                                   blocks);
+  }
   JointStep step{problem.object_from_camera, std::vector<Vector6d>(n, Vector6d::Zero()), 0, 0};
   if (ceres_problem.NumResidualBlocks() > 0) {
     ceres::Solver::Options options;
@@ -297,6 +375,31 @@ JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum
     step.object_from_camera[i] = problem.object_from_camera[i] * motion(twist, problem.centroids[i], problem.radius);
   }
   return step;
+}
+
+std::vector<std::size_t> find_false_pairs(JointProblem const& problem) {
+  JointProblem rest = problem;
+  rest.believed.clear();
+  std::vector<std::size_t> found;
+  for (;;) {
+    rest.object_from_camera = solve_joint(rest, joint_spectrum(rest), PairLoss::quadratic).object_from_camera;
+    JointSpectrum const spectrum = joint_spectrum(rest);
+    std::vector<double> squares(rest.pairs.size(), 0), counted;
+    for (std::size_t k = 0; k < rest.pairs.size(); ++k) {
+      if (rest.pairs[k].information.trace() <= 0) continue;
+      squares[k] = mean_square_against_others(rest, spectrum, rest.pairs[k]);
+      if (squares[k] > 0) counted.push_back(squares[k]);
+    }
+    if (counted.size() < 3) break;
+    std::sort(counted.begin(), counted.end(), std::greater<>());
+    double const usual = std::max(1.0, counted[counted.size() / 2]);
+    if (counted[0] < kFalse * usual || counted[1] > kInseparable * counted[0]) break;
+    auto const worst = static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
+    rest.pairs[worst].information.setZero();
+    found.push_back(worst);
+  }
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 }  // namespace scanview

@@ -62,4 +62,12 @@ struct JointStep {
 /// in what the pairs constrain. `cauchy` doubts pairs whose cost exceeds 1 (initial poses from pairwise motions).
 JointStep solve_joint(JointProblem const& problem, JointSpectrum const& spectrum, PairLoss loss);
 
+/// Pairs that the others contradict, in order of `problem.pairs`: data snooping (Baarda, A testing procedure for use in
+/// geodetic networks, 1968). All pairs are balanced; what a pair is off, in the deviations that its own error would
+/// give it there, is compared with what chance allows, or with what is usual in this problem where that is more (a
+/// sensor whose depths bend errs everywhere). The worst goes, and the rest is balanced anew. A loop that does not
+/// close, but in which each of several pairs might be the wrong one, blames none. Cost: cubic in the number of views,
+/// for each found.
+std::vector<std::size_t> find_false_pairs(JointProblem const& problem);
+
 }  // namespace scanview

@@ -26,10 +26,10 @@ Observers count_observers(ScanSet const& set, std::vector<SurfacePyramid> const&
     for (int col = 0; col < result.counts.cols; ++col) {
       int const x = box.x + col * pitch, y = box.y + row * pitch;
       short& count = result.counts(row, col) = -1;
-      cv::Vec3f const& n = surfaces[view].levels[0].normal(y, x);
-      if (!image.has_depth(x, y) || !std::isfinite(n[0])) continue;
+      SurfacePixel const& pixel = surfaces[view].levels[0].at(x, y);
+      if (!image.has_depth(x, y) || !pixel.has_surface()) continue;
       Eigen::Vector3d const point = image.point(x, y);
-      Eigen::Vector3d const normal(n[0], n[1], n[2]);
+      Eigen::Vector3d const normal(pixel.normal[0], pixel.normal[1], pixel.normal[2]);
       count = 0;
       for (std::size_t other = 0; other < surfaces.size(); ++other)
         if (other != view && distance_to_surface(surfaces[other].levels[0], other_from_view[other] * point,

@@ -13,11 +13,6 @@ constexpr double kMaxCorrelation = 0.8;  // beyond, it is misalignment that neig
 constexpr double kToneGate = 3.0;        // of `cost`, in scales
 constexpr std::size_t kFigures = 15000;  // residuals of a direction that are kept
 
-double tukey_weight(double residual_in_scales) {
-  double const t = residual_in_scales / kTukey;
-  return std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
-}
-
 // A symmetric matrix as it is summed up, its upper half only.
 class SymmetricSum {
  public:
@@ -264,6 +259,11 @@ bool look_up(ViewSurface const& surface, Eigen::Vector3d const& p, SurfaceHit& h
   hit.sigma = nearest.sigma;
   hit.crease = nearest.crease;
   return true;
+}
+
+double tukey_weight(double residual_in_scales) {
+  double const t = residual_in_scales / kTukey;
+  return std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
 }
 
 double robust_scale(std::vector<float>& values) {

@@ -77,6 +77,8 @@ std::vector<bool> seen_samples(ViewSurface const& from, ViewSurface const& to, E
 
 /// Median absolute deviation from zero, scaled to a standard deviation of a normal distribution. Reorders the values.
 double robust_scale(std::vector<float>& values);
+/// Tukey's biweight, of a residual in standard deviations: 1 at 0, 0 beyond 4.685 (95 % efficient for normal noise).
+double tukey_weight(double residual_in_scales);
 /// Share of correspondences that count as independent where neighbours along either axis have this correlation:
 /// ((1 - c)/(1 + c))^2, of a separable autoregressive field.
 double effective_share(double correlation);

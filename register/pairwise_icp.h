@@ -1,5 +1,17 @@
 #pragma once
+#include <memory>
+
 #include "register/pair_form.h"
+
+namespace pcl {
+struct PointNormal;
+namespace registration {
+template <typename Source, typename Target, typename Scalar>
+class CorrespondenceEstimationBase;
+template <typename Source, typename Target, typename Scalar>
+class TransformationEstimation;
+}  // namespace registration
+}  // namespace pcl
 
 namespace scanview {
 
@@ -9,6 +21,12 @@ struct IcpOptions {
   double last_distance = 0.03;  ///< and at the end
   int iterations = 25;
   std::size_t max_samples = 2500;
+  /// PCL's parts, of which any may stand here, or ours (pcl_parts.h); none: nearest points, and our
+  /// SigmaWeightedPlaneEstimation. Clouds lie in `pcl_frame_of(b, radius)`. An estimation that finds no finite motion
+  /// ends the iterations.
+  std::shared_ptr<pcl::registration::CorrespondenceEstimationBase<pcl::PointNormal, pcl::PointNormal, float>>
+      correspondences;
+  std::shared_ptr<pcl::registration::TransformationEstimation<pcl::PointNormal, pcl::PointNormal, float>> estimation;
 };
 
 struct IcpResult {
@@ -20,9 +38,9 @@ struct IcpResult {
   std::size_t matches = 0;  ///< at the end; 0: nothing overlapped, b_from_a is the start
 };
 
-/// Point-to-plane ICP (Chen and Medioni 1991) of two views by nearest points, which bears larger errors at the start
-/// than projection does. Correspondences and their rejection (distance, normals, boundaries) are PCL's; the step is
-/// solved here with unconstrained motions held, since PCL's own solver inverts a singular matrix on planes.
+/// Point-to-plane ICP (Chen and Medioni 1991) of two views in PCL's frame: correspondences (by default nearest points,
+/// which bear larger errors at the start than projection does), their rejection (outlines, normals, median distance)
+/// and the estimation of a motion, until it moves by less than 1e-5 radii.
 IcpResult pairwise_icp(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3d const& b_from_a,
                        IcpOptions const& options);
 

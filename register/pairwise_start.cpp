@@ -14,6 +14,7 @@ namespace scanview {
 namespace {
 
 constexpr double kMostDeviations = 15;  // of the given poses: farther away nothing is looked for
+constexpr std::size_t kMostViews = 60;  // among which pairs are tested against all the others
 constexpr double kAgainst = 0.05;       // of the radius: poses against a firm pair
 constexpr double kPairAccuracy = 0.01;  // of the radius: what a pairwise motion may be off
 
@@ -181,6 +182,13 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
       "register: pairs");
   problem.pairs.clear();
   for (Measured const& one : measured) problem.pairs.push_back(one.pair);
+  for (std::size_t const k : n <= kMostViews ? find_false_pairs(problem) : std::vector<std::size_t>{}) {
+    context.log("the pair of " + set.views[measured[k].pair.a].name + " and " + set.views[measured[k].pair.b].name +
+                " is dropped: the others contradict it");
+    measured[k].pair.information.setZero();
+    measured[k].is_firm = false;
+    problem.pairs[k] = measured[k].pair;
+  }
   // Firm pairs first: a mean cost prefers surfaces that cover each other to those that coincide.
   struct Price {
     int against = 0;  // firm pairs

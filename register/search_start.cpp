@@ -275,14 +275,17 @@ class Search {
     AssemblyOptions options;
     options.radius = radius_;
     options.gate = std::clamp(4 * median(distances), 0.01 * radius_, 0.03 * radius_);
-    std::size_t moves = 0;
     for (auto const& part : connected_parts(views_.size(), tree)) {
       std::vector<std::pair<std::size_t, std::size_t>> joins;
       for (ViewGraphEdge const& edge : tree)
         if (std::find(part.begin(), part.end(), edge.a) != part.end()) joins.emplace_back(edge.a, edge.b);
-      moves += improve_assembly(views_, hypotheses_, joins, options, poses, context_);
+      for (AmbiguousBlock const& block : improve_assembly(views_, hypotheses_, joins, options, poses, context_)) {
+        std::string who;
+        for (std::size_t const view : block.views) who += (who.empty() ? "" : ", ") + set_.views[view].name;
+        context_.warn(fmt::format("{} would fit the other views as well turned by {:.0f} degrees: nothing tells which",
+                                  who, block.turn_deg));
+      }
     }
-    if (moves > 0) context_.log(fmt::format("search: {} moves that fit all the views better", moves));
   }
 
   ScanSet const& set_;

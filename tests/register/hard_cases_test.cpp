@@ -10,21 +10,7 @@ namespace scanview {
 namespace {
 
 using scene::Noise;
-
-// Two views of one solid from nearby, straight on.
-ScanSet two_views(scene::Solid const& solid, Noise noise, double far = 8) {
-  ScanSet set;
-  Camera const camera = Camera::perspective(120, 120, 200, 200, 59.5, 59.5);
-  for (int i = 0; i < 2; ++i) {
-    View view;
-    view.name = std::string("00") + static_cast<char>('0' + i);
-    view.object_from_camera = scene::look_at_origin({i == 0 ? -0.3 : 0.3, 0.1, -4});
-    noise.seed += 17;
-    view.image = scene::capture(solid, camera, *view.object_from_camera, noise, far);
-    set.views.push_back(std::move(view));
-  }
-  return set;
-}
+using scene::two_views;
 
 double moved_in_plane(Alignment const& got, ScanSet const& set) {
   Eigen::Vector3d const d = got.object_from_camera[1].translation() - set.views[1].object_from_camera->translation();

@@ -26,6 +26,31 @@ Solid plane() {
   return {[](Eigen::Vector3d const& p) { return -p.z(); }, 1, {}};
 }
 
+Solid cylinder(Eigen::Vector3d const& axis) {
+  return {[axis = axis.normalized().eval()](Eigen::Vector3d const& p) { return (p - axis.dot(p) * axis).norm() - 1.0; },
+          1,
+          {}};
+}
+
+Solid parallel_planes() {
+  auto const f = [](Eigen::Vector3d const& p) {
+    Eigen::Vector2d const beside(std::abs(p.z() + 0.5) - 0.001, p.x());
+    double const sheet = beside.cwiseMax(0).norm() + std::min(0.0, beside.maxCoeff());
+    return std::min(-p.z(), sheet);
+  };
+  return {f, 1, {}};
+}
+
+Solid corner() {
+  // The rows are the planes' normals, towards the cameras.
+  Eigen::Matrix3d normals;
+  double const slant = 1 / std::sqrt(3.0);
+  normals << std::sqrt(2.0 / 3), 0, -slant,         //
+      -std::sqrt(1.0 / 6), std::sqrt(0.5), -slant,  //
+      -std::sqrt(1.0 / 6), -std::sqrt(0.5), -slant;
+  return {[normals](Eigen::Vector3d const& p) { return (normals * p).minCoeff(); }, 1, {}};
+}
+
 Eigen::Vector3d print(Eigen::Vector3d const& p) {
   double const coarse = std::sin(9 * p.x() + 1) * std::sin(8 * p.y()) + std::sin(10 * p.z() + 2 * p.x());
   double const fine = std::sin(23 * p.x()) * std::sin(19 * p.z() + 1) + std::sin(21 * p.y() + 7 * p.x());
@@ -103,6 +128,20 @@ ScanSet ring(Solid const& solid, int count, double height, Noise const& noise, b
     Noise one = noise;
     one.seed = noise.seed * 1000 + static_cast<std::uint64_t>(i);
     view.image = capture(solid, camera, *view.object_from_camera, one);
+    set.views.push_back(std::move(view));
+  }
+  return set;
+}
+
+ScanSet two_views(Solid const& solid, Noise noise) {
+  ScanSet set;
+  Camera const camera = Camera::perspective(120, 120, 200, 200, 59.5, 59.5);
+  for (int i = 0; i < 2; ++i) {
+    View view;
+    view.name = std::string("00") + static_cast<char>('0' + i);
+    view.object_from_camera = look_at_origin({i == 0 ? -0.3 : 0.3, 0.1, -4});
+    noise.seed += 17;
+    view.image = capture(solid, camera, *view.object_from_camera, noise);
     set.views.push_back(std::move(view));
   }
   return set;

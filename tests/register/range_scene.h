@@ -20,6 +20,13 @@ Solid blob();
 Solid sphere();
 /// The half space z > 0 seen from below, with or without a printed pattern.
 Solid plane();
+/// A cylinder of radius 1 without ends about an axis through the origin.
+Solid cylinder(Eigen::Vector3d const& axis);
+/// The half space z > 0 with a thin sheet before one half of it, seen from below: two parallel planes, and no wall
+/// between them.
+Solid parallel_planes();
+/// Three planes at right angles that meet in the origin, seen from below into the corner, each at the same slant.
+Solid corner();
 /// A box of half sides 0.7, 0.5, 0.9 with a printed pattern.
 Solid printed_box();
 /// A pattern of soft dots of three sizes.
@@ -42,6 +49,9 @@ Eigen::Isometry3d look_at_origin(Eigen::Vector3d const& eye);
 /// `count` views on a ring of radius 4 at height `height`, 160 x 160 pixels, names "000"...; object_from_camera is
 /// true.
 ScanSet ring(Solid const& solid, int count, double height, Noise const& noise, bool orthographic = false);
+
+/// Two views, "000" and "001", of 120 x 120 pixels from nearby, straight on; object_from_camera is true.
+ScanSet two_views(Solid const& solid, Noise noise);
 
 /// Every pose but the first turned by `degrees` about a random axis through the origin and moved by `length`.
 std::vector<Eigen::Isometry3d> disturbed(std::vector<Eigen::Isometry3d> const& poses, double degrees, double length,
