@@ -30,8 +30,9 @@ constexpr std::size_t kManyViews = 60, kEdgesOfMany = 12;  // of so many, each i
 constexpr int kReturns = 3;                                // of what nothing holds to where it was told to be
 constexpr double kReturned = 0.02;                         // of a pixel
 constexpr int kScaleRounds = 4;  // of a level, in which scales, gates and neighbours are still measured
-// Of pairs that are right, contradictions stay below 0.15 and misfits below 4 (pair_search.cpp).
-constexpr double kMostContradiction = 0.2, kMostMisfit = 4;
+// Of pairs that are right, contradictions stay below 0.15 whatever the sensor (pair_search.cpp); a small misfit excuses
+// the flying pixels of outlines.
+constexpr double kMostContradiction = 0.2, kMostMisfit = 2.5;
 constexpr double kSurelyTorn = 10;  // mean square of a pair's wish in its deviations: chance does not give that
 constexpr double kContradictionGate = 0.03;  // radii
 
