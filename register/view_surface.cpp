@@ -17,6 +17,7 @@ constexpr double kMaxSlope = 4.0;           // depth a pixel's width, of one sur
 constexpr double kTargetSlopeNoise = 0.04;  // radians: the window grows until normals are about this good
 constexpr double kCreaseMisfit = 0.15;      // of a pixel's width: what a plane may be off where the surface is smooth
 constexpr int kMinLevelSide = 40;
+constexpr double kPointsOfCentroid = 10000;  // a median of so many is good to a hundredth of the radius
 constexpr float kToneBlur = 6.0f;  // pixels of the level
 
 float nan_f() { return kMissing; }
@@ -428,11 +429,12 @@ SurfacePyramid build_pyramid(RangeImage const& image, PyramidOptions const& opti
   }
 
   std::vector<double> xs, ys, zs, distances;
-  for (int y = 0; y < image.depth.rows; ++y)
-    for (int x = 0; x < image.depth.cols; ++x) {
+  pyramid.depths = static_cast<std::size_t>(cv::countNonZero(levels[0].depth == levels[0].depth));
+  int const step =
+      std::max(1, static_cast<int>(std::sqrt(static_cast<double>(pyramid.depths) / kPointsOfCentroid)));
+  for (int y = 0; y < image.depth.rows; y += step)
+    for (int x = y / step % 2; x < image.depth.cols; x += step) {
       if (!image.has_depth(x, y)) continue;
-      ++pyramid.depths;
-      if ((x + y) % 2) continue;
       Eigen::Vector3d const p = image.point(x, y);
       xs.push_back(p.x());
       ys.push_back(p.y());
