@@ -10,6 +10,8 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/files.h"
+#include "base/html.h"
 #include "base/median.h"
 #include "base/random.h"
 #include "bench/register_open3d.h"
@@ -23,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Settings {
-  fs::path trials, data;
+  fs::path trials, data, plot;
   int multiway = 0;
   bool automatic = false, peers = false, verbose = false;
   std::string only;
@@ -55,11 +57,11 @@ ScanSet pair_of(RegisterTrial const& trial, TrialViews const& views) {
   return set;
 }
 
-Outcome run_ours(RegisterTrial const& trial, ScanSet const& set, bool automatic, bool verbose) {
+Outcome run_ours(RegisterTrial const& trial, ScanSet const& set, RegisterOptions options, bool automatic,
+                 bool verbose) {
   Context context;
   context.threads = 1;
   if (verbose) context.on_log = [](std::string const& line) { fmt::print("  {}\n", line); };
-  RegisterOptions options;
   options.given_std = 0;
   if (automatic) options.init = RegisterOptions::Init::automatic;
   Outcome outcome;
@@ -87,13 +89,51 @@ struct Tally {
   }
   void print(std::string const& who) const {
     fmt::print(
-        "{:24} {:3} of {:3} right, {:3} accepted, {:3} wrongly | median {:.4f} deg {:.4f} mm, worst {:.4f} deg {:.4f} "
+        "{:38} {:3} of {:3} right, {:3} accepted, {:3} wrongly | median {:.4f} deg {:.4f} mm, worst {:.4f} deg {:.4f} "
         "mm | {:.3f} s\n",
         who, converged, count, accepted, wrong, median(degrees), median(lengths),
         *std::max_element(degrees.begin(), degrees.end()), *std::max_element(lengths.begin(), lengths.end()),
         median(seconds));
   }
 };
+
+/// Our own settings between speed and error: correspondences, and levels of the pyramid.
+std::vector<RegisterOptions> knobs() {
+  std::vector<RegisterOptions> all;
+  for (int const correspondences : {500, 1500, 6000, 20000}) {
+    all.emplace_back();
+    all.back().max_correspondences = correspondences;
+  }
+  for (int const levels : {2, 3}) {
+    all.emplace_back();
+    all.back().levels = levels;
+  }
+  return all;
+}
+
+std::string knob_name(RegisterOptions const& knob) {
+  return knob.max_correspondences > 0 ? fmt::format("scanview, {} correspondences", knob.max_correspondences)
+                                      : fmt::format("scanview, {} levels", knob.levels);
+}
+
+/// Median error against median time of all trials of a set, a dot a method.
+void write_plot(fs::path const& path, std::map<std::string, Tally> const& tallies) {
+  std::map<std::string, std::vector<PlotCurve>> of_sets;
+  for (auto const& [name, tally] : tallies) {
+    std::string const set = name.substr(0, name.find(':')), who = name.substr(name.find(':') + 2);
+    bool const is_ours = who.starts_with("scanview");
+    of_sets[set].push_back(
+        {who, {{median(tally.seconds), median(tally.degrees)}}, is_ours ? "#2a7a4b" : "#c0603a", true});
+  }
+  std::vector<ReportSection> sections;
+  PlotOptions axes;
+  axes.x_label = "seconds a pair, one thread, preparation included";
+  axes.y_label = "median error, degrees";
+  axes.log_x = axes.log_y = true;
+  axes.width = 720, axes.height = 480;
+  for (auto const& [set, curves] : of_sets) sections.push_back({set, set, svg_plot(curves, axes)});
+  write_file(path, html_page("Registration: error against time", "", sections));
+}
 
 void bench(Settings const& settings) {
   Context context;
@@ -114,7 +154,10 @@ void bench(Settings const& settings) {
                    outcome.accepted ? "" : "refused", outcome.seconds);
       std::cout.flush();
     };
-    note("scanview", run_ours(trial, set, settings.automatic, settings.verbose));
+    note("scanview", run_ours(trial, set, {}, settings.automatic, settings.verbose));
+    if (!settings.plot.empty())
+      for (RegisterOptions const& knob : knobs())
+        note(knob_name(knob), run_ours(trial, set, knob, settings.automatic, false));
     if (!settings.peers) continue;
     auto const peer = [&](std::string const& who, auto const& align_pair) {
       Outcome outcome;
@@ -131,6 +174,7 @@ void bench(Settings const& settings) {
 #endif
   }
   for (auto const& [who, tally] : tallies) tally.print(who);
+  if (!settings.plot.empty()) write_plot(settings.plot, tallies);
 }
 
 /// All pairs whose views share 0.3 of the smaller one's surface, at the true poses.
@@ -167,7 +211,8 @@ void bench_multiway(Settings const& settings) {
       truth.push_back(*view.object_from_camera);
     }
     for (std::size_t i = 0; i < set.views.size(); ++i)
-      set.views[i].object_from_camera = disturbed(truth[i], set.views[i].image, kDegrees, kShare * kSize, context.seed, i);
+      set.views[i].object_from_camera =
+          disturbed(truth[i], set.views[i].image, kDegrees, kShare * kSize, context.seed, i);
     RegisterOptions options;
     options.given_std = 0;
     auto start = std::chrono::steady_clock::now();
@@ -192,6 +237,7 @@ int main(int argc, char** argv) {
   app.add_option("trials", settings.trials, "Pinned starts");
   app.add_option("--multiway", settings.multiway, "Starts of the ten synthetic views together");
   app.add_option("--data", settings.data, "Folder of the Stanford archives")->required();
+  app.add_option("--plot", settings.plot, "Page with error against time, our knobs beside");
   app.add_flag("--auto", settings.automatic, "From nothing instead of the start");
   app.add_flag("--peers", settings.peers, "PCL's methods as well, and Open3D's where it is installed");
   app.add_flag("--verbose", settings.verbose, "A line a trial");

@@ -67,7 +67,8 @@ std::vector<Eigen::Isometry3d> multiway_with_open3d(ScanSet const& set, double s
   double const finest = kStages.back() * size;
   for (std::size_t a = 0; a < clouds.size(); ++a)
     for (std::size_t b = a + 1; b < clouds.size(); ++b) {
-      Eigen::Matrix4d const start = (set.views[b].object_from_camera->inverse() * *set.views[a].object_from_camera).matrix();
+      Eigen::Matrix4d const start =
+          (set.views[b].object_from_camera->inverse() * *set.views[a].object_from_camera).matrix();
       if (o3d::EvaluateRegistration(clouds[a], clouds[b], 0.03 * size, start).fitness_ < kFewestInliers) continue;
       Eigen::Matrix4d const b_from_a = in_stages(clouds[a], clouds[b], start, size);
       graph.edges_.emplace_back(static_cast<int>(a), static_cast<int>(b), b_from_a,

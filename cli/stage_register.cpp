@@ -20,6 +20,7 @@ Json to_json(RegisterOptions const& options) {
           {"refine", options.refine},
           {"levels", options.levels},
           {"max_iterations", options.max_iterations},
+          {"max_correspondences", options.max_correspondences},
           {"min_overlap", options.min_overlap},
           {"given_std", options.given_std}};
 }

@@ -92,6 +92,7 @@ RegisterRequest resolve(RegisterFlags const& flags, std::vector<std::string> con
       settings, "register",
       {number_setting("given_std", request.options.given_std), integer_setting("levels", request.options.levels),
        integer_setting("max_iterations", request.options.max_iterations),
+       integer_setting("max_correspondences", request.options.max_correspondences),
        number_setting("min_overlap", request.options.min_overlap), integer_setting("exposure", request.exposure)});
   request.options.validate();
   return request;

@@ -196,6 +196,8 @@ class Aligner {
     match.max_samples = std::clamp<std::size_t>(level > 0 ? 240000 / pairs : 480000 / pairs, 1500,
                                                 level > 0 ? kFewSamples / 2 : kFewSamples);
     if (uses_all_) match.max_samples = std::max(match.max_samples, kPairSamples / pairs);
+    if (options_.max_correspondences > 0)
+      match.max_samples = std::min(match.max_samples, static_cast<std::size_t>(options_.max_correspondences));
     match.is_near = uses_all_;
     if (scales_.geometry > 0) match.geometry_scale = scales_.geometry;
     if (scales_.tone > 0) match.tone_scale = scales_.tone;
@@ -305,7 +307,9 @@ class Aligner {
     // Every pixel counts once the poses hardly move: the error falls with the square root of their number, where they
     // do not share their errors.
     for (std::size_t stage = coarsest_ + 2; stage-- > 0;) {
-      if (stage == 0 && scales_.geometry_correlation > kSharedErrors) break;
+      bool const few_are_enough =
+          options_.max_correspondences > 0 && static_cast<std::size_t>(options_.max_correspondences) <= kFewSamples;
+      if (stage == 0 && (scales_.geometry_correlation > kSharedErrors || few_are_enough)) break;
       std::size_t const level = stage > 0 ? stage - 1 : 0;
       uses_all_ = stage == 0;
       double const pixel = median_pixel(level);
@@ -450,8 +454,7 @@ class Aligner {
       PairFigures& pair = result_.pairs[e];
       if (pair.suspicious) continue;
       bool const far = residuals[e] > 3 * usual_residual && residuals[e] > 1e-3 * radius_;
-      bool const torn =
-          wishes[e] > 6 * usual_wish && wishes[e] > 0.02 * radius_ && squares[e] > kSurelyTorn;
+      bool const torn = wishes[e] > 6 * usual_wish && wishes[e] > 0.02 * radius_ && squares[e] > kSurelyTorn;
       pair.suspicious = far || torn;
       if (far)
         context_.warn(fmt::format("views {} and {} do not fit: median distance {:.3g} {}, of all pairs {:.3g}",
@@ -488,6 +491,8 @@ void RegisterOptions::validate() const {
   if (!turntable_axis.allFinite()) refuse("turntable axis must be finite");
   if (levels < 1 || levels > 12) refuse("levels must be 1 to 12");
   if (max_iterations < 1) refuse("max_iterations must be at least 1");
+  if (max_correspondences != 0 && max_correspondences < 100)
+    refuse("max_correspondences must be 0 (all) or at least 100");
   if (!(given_std >= 0)) refuse("given_std must not be negative");
   if (!(min_overlap > 0 && min_overlap <= 1)) refuse("min_overlap must lie above 0 and at most at 1");
 }

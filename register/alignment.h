@@ -16,8 +16,11 @@ struct RegisterOptions {
   /// `turntable`: axis direction in the first camera's coordinates; zero: fitted.
   Eigen::Vector3d turntable_axis{0, 0, 0};
   bool refine = true;
-  int levels = 4;            ///< of the pyramid, coarse to fine
-  int max_iterations = 50;   ///< joint refinements with fresh correspondences
+  int levels = 4;           ///< of the pyramid, coarse to fine
+  int max_iterations = 50;  ///< joint refinements with fresh correspondences
+  /// Samples of a view that are matched with another one at the end, at most: the knob between speed and error, which
+  /// falls with their square root. 0: all, where neighbours do not share their errors.
+  int max_correspondences = 0;
   double min_overlap = 0.1;  ///< share of a view's depths that another view sees: pairs below are not used
   /// `given`: one standard deviation of the given poses, as a share of a view's radius (a rotation moves a point at
   /// this radius). Where the data says more, this changes nothing; where surfaces nearly slide it keeps a pose near

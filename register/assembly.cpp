@@ -13,12 +13,12 @@ namespace scanview {
 namespace {
 
 constexpr std::size_t kLook = 120, kFit = 300, kJudge = 500, kCount = 2000;  // samples of a view
-constexpr double kLookGate = 0.05, kFitGate = 0.02;           // radii
+constexpr double kLookGate = 0.05, kFitGate = 0.02;                          // radii
 constexpr int kFitSteps = 6;
-constexpr std::size_t kTried = 8;        // poses of a block that are fitted
-constexpr double kWorthALook = 0.3;      // of what the block reaches where it is
-constexpr double kSameMotion = 0.08;     // radii
-constexpr double kBetter = 1.03;         // a move must gain more than chance of few samples gives
+constexpr std::size_t kTried = 8;     // poses of a block that are fitted
+constexpr double kWorthALook = 0.3;   // of what the block reaches where it is
+constexpr double kSameMotion = 0.08;  // radii
+constexpr double kBetter = 1.03;      // a move must gain more than chance of few samples gives
 constexpr int kSweeps = 3;
 constexpr double kOtherPose = 10;  // degrees: less may be the same minimum
 
@@ -118,8 +118,8 @@ class Assembly {
     for (std::size_t const a : cut.moving)
       for (std::size_t const b : cut.staying) {
         Eigen::Isometry3d const pose = b_from_a(a, b, move);
-        sum.score += pose_score(views_[a], views_[b], pose, options_.gate, options_.radius, kJudge,
-                                printed_[a] && printed_[b]);
+        sum.score +=
+            pose_score(views_[a], views_[b], pose, options_.gate, options_.radius, kJudge, printed_[a] && printed_[b]);
         sum.in_front += static_cast<double>(
             check_pose(level_of(views_[a], 1), level_of(views_[b], 1), pose, kLookGate * options_.radius, kCount)
                 .in_front);

@@ -30,9 +30,10 @@ struct AmbiguousBlock {
 /// views, is tried at the other poses which some pair proposes, fitted there to all the rest together, and judged by
 /// free space and print against all the rest; what fits better stays. `tree`: pairs of views that join one part; other
 /// views are left alone. Returns what remains ambiguous. Deterministic.
-std::vector<AmbiguousBlock> improve_assembly(std::vector<SurfacePyramid> const& views, std::vector<PairHypotheses> const& hypotheses,
-                             std::vector<std::pair<std::size_t, std::size_t>> const& tree,
-                             AssemblyOptions const& options, std::vector<Eigen::Isometry3d>& object_from_camera,
-                             Context& context);
+std::vector<AmbiguousBlock> improve_assembly(std::vector<SurfacePyramid> const& views,
+                                             std::vector<PairHypotheses> const& hypotheses,
+                                             std::vector<std::pair<std::size_t, std::size_t>> const& tree,
+                                             AssemblyOptions const& options,
+                                             std::vector<Eigen::Isometry3d>& object_from_camera, Context& context);
 
 }  // namespace scanview

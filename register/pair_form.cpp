@@ -293,7 +293,8 @@ PairForm match_pair(ViewSurface const& a, ViewSurface const& b, Eigen::Isometry3
   if (form.hits_ab + form.hits_ba > 0) {
     form.information = sums.shape.matrix();
     form.gradient = sums.shape_gradient;
-    if (options.hold_free_motions) form.held = hold_free_motions(sums, options.is_near, form.information, form.gradient);
+    if (options.hold_free_motions)
+      form.held = hold_free_motions(sums, options.is_near, form.information, form.gradient);
   } else {
     form.held = 6;
   }

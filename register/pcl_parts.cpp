@@ -85,8 +85,8 @@ void ProjectiveCorrespondence::index_target() {
     int const x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
     if (x >= 0 && y >= 0 && x < index_.cols && y < index_.rows) index_(y, x) = static_cast<int>(i);
   }
-  auto const pixels = static_cast<double>(
-      std::count_if(surface_->pixels.begin(), surface_->pixels.end(), [](SurfacePixel const& p) { return p.has_surface(); }));
+  auto const pixels = static_cast<double>(std::count_if(surface_->pixels.begin(), surface_->pixels.end(),
+                                                        [](SurfacePixel const& p) { return p.has_surface(); }));
   double const points = static_cast<double>(std::max<std::size_t>(1, target_->size()));
   reach_ = static_cast<int>(std::ceil(std::sqrt(pixels / points))) / 2;
   target_cloud_updated_ = false;

@@ -201,7 +201,8 @@ class Search {
         if (std::pair(balance[k], here) > std::pair(balance[worst], there)) worst = k;
       }
       if (links_.empty() || balance[worst] <= 0) return;
-      drop(links_[worst], fmt::format("triangles with other links contradict it ({:.1f} more than confirm it)", balance[worst]));
+      drop(links_[worst],
+           fmt::format("triangles with other links contradict it ({:.1f} more than confirm it)", balance[worst]));
       links_.erase(links_.begin() + static_cast<std::ptrdiff_t>(worst));
     }
   }

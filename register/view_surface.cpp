@@ -18,7 +18,7 @@ constexpr double kTargetSlopeNoise = 0.04;  // radians: the window grows until n
 constexpr double kCreaseMisfit = 0.15;      // of a pixel's width: what a plane may be off where the surface is smooth
 constexpr int kMinLevelSide = 40;
 constexpr double kPointsOfCentroid = 10000;  // a median of so many is good to a hundredth of the radius
-constexpr float kToneBlur = 6.0f;  // pixels of the level
+constexpr float kToneBlur = 6.0f;            // pixels of the level
 
 float nan_f() { return kMissing; }
 
@@ -430,8 +430,7 @@ SurfacePyramid build_pyramid(RangeImage const& image, PyramidOptions const& opti
 
   std::vector<double> xs, ys, zs, distances;
   pyramid.depths = static_cast<std::size_t>(cv::countNonZero(levels[0].depth == levels[0].depth));
-  int const step =
-      std::max(1, static_cast<int>(std::sqrt(static_cast<double>(pyramid.depths) / kPointsOfCentroid)));
+  int const step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(pyramid.depths) / kPointsOfCentroid)));
   for (int y = 0; y < image.depth.rows; y += step)
     for (int x = y / step % 2; x < image.depth.cols; x += step) {
       if (!image.has_depth(x, y)) continue;
