@@ -19,7 +19,6 @@ constexpr std::size_t kLookedAt = 150, kRefined = 12, kFinal = 4;
 constexpr double kSameTurn = 8 * kDegree, kSamePlace = 0.08;  // radii: two poses that are one
 constexpr double kDamping = 1e-4;                             // of the trace: free motions stay
 constexpr std::size_t kFewestMatched = 30;
-constexpr double kUnique = 1.0;  // of a firm pose's score: no other pose of the pair reaches it
 constexpr std::size_t kFewestTones = 50;
 constexpr double kLeastPrint = 0.03;    // of brightness: robust standard deviation
 constexpr double kLeastLikeness = 0.5;  // of print that meets itself
@@ -259,15 +258,6 @@ PairPose search_pair(SurfacePyramid const& a, SurfacePyramid const& b,
   for (Candidate const& candidate : candidates)
     if (!is_same(candidate.b_from_a, best.b_from_a, a.centroid, radius)) best.others.push_back(candidate.b_from_a);
   best.verdict = judge(best, are_printed);
-  // What fits hardly better than another pose that is contradicted fits by chance.
-  auto const common_score = [&](Eigen::Isometry3d const& pose) {
-    return pose_score(a, b, pose, 0.4 * gate, radius, kManySamples, are_printed);
-  };
-  double const least = kUnique * common_score(best.b_from_a);
-  if (best.verdict == PairPose::Verdict::firm &&
-      std::any_of(best.others.begin(), best.others.end(),
-                  [&](Eigen::Isometry3d const& other) { return common_score(other) > least; }))
-    best.verdict = PairPose::Verdict::weak;
   return best;
 }
 

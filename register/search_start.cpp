@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <map>
 
@@ -19,11 +20,14 @@ namespace {
 constexpr double kAgreement = 0.2;           // of the radius: links that say the same
 constexpr double kLinkAccuracy = 0.01;       // of the radius: what a link may be off
 constexpr double kLoneContradiction = 0.07;  // of a weak link that no triangle confirms
-constexpr double kMostMisfit = 1.6;          // of the usual link's
-constexpr std::size_t kAllPairs = 30;        // views of which every pair is searched
-constexpr std::size_t kFewestSteps = 3;      // neighbours on each side, of more views
-constexpr double kNear = 0.1, kWide = 0.2;   // radii: neighbourhoods of shape features
-constexpr double kApart = 4;                 // radii between parts
+// Deviation of a link's least held motion, of the radius: right links of the narrowest overlaps have 0.005, smooth
+// patches that lie on each other by chance 0.04.
+constexpr double kHeld = 0.015;
+constexpr double kMostMisfit = 1.6;         // of the usual link's
+constexpr std::size_t kAllPairs = 30;       // views of which every pair is searched
+constexpr std::size_t kFewestSteps = 3;     // neighbours on each side, of more views
+constexpr double kNear = 0.1, kWide = 0.2;  // radii: neighbourhoods of shape features
+constexpr double kApart = 4;                // radii between parts
 
 struct Link {
   std::size_t a = 0, b = 0;
@@ -207,12 +211,35 @@ class Search {
     }
   }
 
+  // Whether the surfaces hold the pose of a link: smooth ones lie on each other in many.
+  bool is_held(Link const& link) const {
+    MatchOptions options;
+    options.radius = radius_;
+    options.gate = std::max(0.01 * radius_, 5 * link.pose.distance);
+    options.max_samples = 1500;
+    options.geometry_scale = std::max(0.05, link.pose.misfit);
+    options.hold_free_motions = false;
+    auto const match = [&] {
+      return match_pair(middle_level(views_[link.a]), middle_level(views_[link.b]), link.pose.b_from_a,
+                        views_[link.a].centroid, views_[link.b].centroid, options);
+    };
+    PairForm const first = match();
+    options.geometry_share = effective_share(first.geometry.correlation());
+    options.tone_share = effective_share(first.tone.correlation());
+    if (!first.tone.values.empty()) {
+      std::vector<float> tones = first.tone.values;
+      options.tone_scale = std::max(0.01, robust_scale(tones));
+    }
+    Eigen::SelfAdjointEigenSolver<Matrix6d> const spectrum(match().information);
+    return spectrum.eigenvalues()[0] > 1 / std::pow(kHeld * radius_, 2);
+  }
+
   // Weak links stay where a triangle closes, or where nothing else joins two views and little contradicts them.
   void drop_unconfirmed() {
     std::vector<double> const balance = balances();
     std::vector<Link> kept, open;
     for (std::size_t k = 0; k < links_.size(); ++k)
-      (is_firm(links_[k].pose) || balance[k] < 0 ? kept : open).push_back(links_[k]);
+      (balance[k] < 0 || (is_firm(links_[k].pose) && is_held(links_[k])) ? kept : open).push_back(links_[k]);
     std::stable_sort(open.begin(), open.end(), [](Link const& l, Link const& r) {
       return l.pose.check.contradiction() < r.pose.check.contradiction();
     });
