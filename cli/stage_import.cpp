@@ -40,19 +40,21 @@ std::string hash_listing(fs::path const& input) {
   return hash_bytes(all);
 }
 
+/// The folder that names of inputs are relative to, absolute: of a bare file name, the parent path is empty.
+fs::path input_root(fs::path const& input) {
+  fs::path const path = fs::absolute(input).lexically_normal();
+  return fs::is_directory(path) ? path : path.parent_path();
+}
+
 std::string input_name(fs::path const& file, fs::path const& input) {
-  fs::path const root = fs::is_directory(input) ? input : input.parent_path();
-  return fs::absolute(file)
-      .lexically_normal()
-      .lexically_relative(fs::absolute(root).lexically_normal())
-      .generic_string();
+  return fs::absolute(file).lexically_normal().lexically_relative(input_root(input)).generic_string();
 }
 
 /// Inputs as the last import recorded them, hashed anew. Any file that is gone makes it differ.
 Json hash_recorded_inputs(fs::path const& folder, fs::path const& input) {
   Json inputs = Json::object();
   try {
-    fs::path const root = fs::is_directory(input) ? input : input.parent_path();
+    fs::path const root = input_root(input);
     StageRecord const record = read_stage_record(folder, "import");
     for (auto const& [name, hash] : record.inputs.items())
       if (name != "listing") inputs[name] = hash_file(root / name);

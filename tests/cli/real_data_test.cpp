@@ -36,5 +36,19 @@ TEST_F(RealData, BearAlignsToTheDotsAndComesBackFromItsCameras) {
   EXPECT_GE(all["stages"]["evaluate"]["renderers"]["source_views"]["psnr_common_min"].get<double>(), 35);
 }
 
+TEST_F(RealData, BunnyComesTogetherFromNothingAsTheReadmeSays) {
+  if (!fs::exists(data("bunny_range.tar.xz"))) GTEST_SKIP() << "bunny_range.tar.xz is not here";
+  // A bare file name, as one types it where the file lies.
+  CommandResult const imported = run_scanview({"import", "stanford", "bunny_range.tar.xz", "-o", in("bunny")},
+                                              [&] { fs::current_path(data("bunny_range.tar.xz").parent_path()); });
+  ASSERT_EQ(imported.exit_code, 0) << imported.errors;
+  fs::copy_file(in("bunny") + "/scanset.json", in("published.json"));
+  Json const registered = run({"register", in("bunny"), "--init", "auto", "--reference", in("published.json")});
+  EXPECT_EQ(registered["parts"].size(), 1u);
+  // The published poses are good to about 0.1 degrees and 0.1 mm each.
+  EXPECT_LE(registered["reference"]["max_deg"].get<double>(), 0.3);
+  EXPECT_LE(registered["reference"]["max_length"].get<double>(), 0.5e-3);
+}
+
 }  // namespace
 }  // namespace scanview
