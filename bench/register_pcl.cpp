@@ -7,21 +7,13 @@
 #include <pcl/registration/icp.h>
 #include <pcl/registration/transformation_estimation_point_to_plane_lls.h>
 
+#include "bench/register_trials.h"
+
 namespace scanview {
 namespace {
 
 using Point = pcl::PointNormal;
 using Cloud = pcl::PointCloud<Point>;
-
-// PCL counts in floats: clouds lie about the origin, and a at its start.
-Eigen::Vector3d middle_of(RangeImage const& image) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0;
-  for (int y = 0; y < image.depth.rows; ++y)
-    for (int x = 0; x < image.depth.cols; ++x)
-      if (image.has_depth(x, y)) sum += image.point(x, y), ++count;
-  return sum / std::max(count, 1.0);
-}
 
 Cloud::Ptr cloud_of(RangeImage const& image, Eigen::Isometry3d const& pose, bool with_normals) {
   Cloud::Ptr cloud(new Cloud);
@@ -62,7 +54,8 @@ Eigen::Isometry3d in_stages(Method& method, Cloud::Ptr const& a, Cloud::Ptr cons
 
 Eigen::Isometry3d align_with_pcl(ScanSet const& set, Eigen::Isometry3d const& start, double size, PclMethod method) {
   bool const is_plane = method == PclMethod::plane;
-  Eigen::Isometry3d const centred(Eigen::Translation3d(-middle_of(set.views[1].image)));
+  // PCL counts in floats: clouds lie about the origin, and a at its start.
+  Eigen::Isometry3d const centred(Eigen::Translation3d(-centroid_of(set.views[1].image)));
   Cloud::Ptr const a = cloud_of(set.views[0].image, centred * start, is_plane),
                    b = cloud_of(set.views[1].image, centred, is_plane);
   Eigen::Isometry3d move;

@@ -113,15 +113,6 @@ Eigen::Isometry3d read_transform(std::istream& words) {
   return result;
 }
 
-Eigen::Vector3d centroid_of(RangeImage const& image) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0;
-  for (int y = 0; y < image.depth.rows; ++y)
-    for (int x = 0; x < image.depth.cols; ++x)
-      if (image.has_depth(x, y)) sum += image.point(x, y), ++count;
-  return sum / std::max(count, 1.0);
-}
-
 Eigen::Vector3d random_direction(CounterRandom& random) {
   return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
@@ -144,6 +135,15 @@ double share_one_way(RangeImage const& from, RangeImage const& to, Eigen::Isomet
 }
 
 }  // namespace
+
+Eigen::Vector3d centroid_of(RangeImage const& image) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (int y = 0; y < image.depth.rows; ++y)
+    for (int x = 0; x < image.depth.cols; ++x)
+      if (image.has_depth(x, y)) sum += image.point(x, y), ++count;
+  return sum / std::max(count, 1.0);
+}
 
 std::map<std::string, View> read_synthetic_views(fs::path const& data, Context& context) {
   std::map<std::string, View> views;

@@ -27,6 +27,9 @@ TrialViews read_trial_views(std::filesystem::path const& data, Context& context)
 /// Ten views of the bunny's model, millimetres, sigma 0.1 mm along z, by the seed of the context.
 std::map<std::string, View> read_synthetic_views(std::filesystem::path const& data, Context& context);
 
+/// Mean of what a view saw, camera coordinates.
+Eigen::Vector3d centroid_of(RangeImage const& image);
+
 /// A pose turned and moved about the middle of what its view saw, by this much in directions of the seed's choice.
 Eigen::Isometry3d disturbed(Eigen::Isometry3d const& target_from_camera, RangeImage const& image, double degrees,
                             double length, std::uint64_t seed, std::size_t number);

@@ -81,9 +81,7 @@ class Aligner {
   bool has_searched_ = false;
   bool uses_all_ = false;  ///< of the finest level's samples
 
-  ViewSurface const& surface(std::size_t view, std::size_t level) const {
-    return views_[view].levels[std::min(level, views_[view].levels.size() - 1)];
-  }
+  ViewSurface const& surface(std::size_t view, std::size_t level) const { return views_[view].level(level); }
 
   void prepare() {
     views_.resize(set_.views.size());

@@ -22,10 +22,6 @@ constexpr double kBetter = 1.03;      // a move must gain more than chance of fe
 constexpr int kSweeps = 3;
 constexpr double kOtherPose = 10;  // degrees: less may be the same minimum
 
-ViewSurface const& level_of(SurfacePyramid const& view, std::size_t level) {
-  return view.levels[std::min(level, view.levels.size() - 1)];
-}
-
 double turn_deg(Eigen::Isometry3d const& motion) {
   return std::abs(Eigen::AngleAxisd(motion.linear()).angle()) * 180 / std::numbers::pi;
 }
@@ -96,9 +92,9 @@ class Assembly {
     double sum = 0;
     for (std::size_t const a : cut.moving)
       for (std::size_t const b : cut.staying)
-        sum += check_pose(level_of(views_[a], 2), level_of(views_[b], 2), b_from_a(a, b, move),
-                          kLookGate * options_.radius, kLook)
-                   .score();
+        sum +=
+            check_pose(views_[a].level(2), views_[b].level(2), b_from_a(a, b, move), kLookGate * options_.radius, kLook)
+                .score();
     return sum;
   }
 
@@ -121,8 +117,7 @@ class Assembly {
         sum.score +=
             pose_score(views_[a], views_[b], pose, options_.gate, options_.radius, kJudge, printed_[a] && printed_[b]);
         sum.in_front += static_cast<double>(
-            check_pose(level_of(views_[a], 1), level_of(views_[b], 1), pose, kLookGate * options_.radius, kCount)
-                .in_front);
+            check_pose(views_[a].level(1), views_[b].level(1), pose, kLookGate * options_.radius, kCount).in_front);
       }
     return sum;
   }
@@ -146,7 +141,7 @@ class Assembly {
       Eigen::Vector3d const here = move * center;
       for (std::size_t const a : cut.moving)
         for (std::size_t const b : cut.staying) {
-          PairForm const form = match_pair(level_of(views_[a], 1), level_of(views_[b], 1), b_from_a(a, b, move),
+          PairForm const form = match_pair(views_[a].level(1), views_[b].level(1), b_from_a(a, b, move),
                                            views_[a].centroid, views_[b].centroid, options);
           if (form.hits_ab + form.hits_ba < 20) continue;
           // The form's motion is about its centre in b's frame, the block's about `here` in the object's.

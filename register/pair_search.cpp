@@ -23,10 +23,6 @@ constexpr std::size_t kFewestTones = 50;
 constexpr double kLeastPrint = 0.03;    // of brightness: robust standard deviation
 constexpr double kLeastLikeness = 0.5;  // of print that meets itself
 
-ViewSurface const& level_of(SurfacePyramid const& view, std::size_t level) {
-  return view.levels[std::min(level, view.levels.size() - 1)];
-}
-
 struct Candidate {
   Eigen::Isometry3d b_from_a;
   double score;
@@ -134,7 +130,7 @@ double print_likeness(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::I
   options.radius = radius;
   options.gate = gate;
   options.max_samples = kManySamples;
-  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options);
+  PairForm const form = match_pair(a.level(1), b.level(1), b_from_a, a.centroid, b.centroid, options);
   return form.tone.values.size() >= kFewestTones ? form.tone_correlation : 0;
 }
 
@@ -188,14 +184,14 @@ PairPose::Verdict judge(PairPose const& pose, bool has_print) {
 
 bool has_print(SurfacePyramid const& view) {
   std::vector<float> tones;
-  for (SurfaceSample const& sample : level_of(view, 1).samples)
+  for (SurfaceSample const& sample : view.level(1).samples)
     if (std::isfinite(sample.tone)) tones.push_back(sample.tone);
   return tones.size() >= kFewestTones && robust_scale(tones) > kLeastPrint;
 }
 
 double pose_score(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d const& b_from_a, double gate,
                   double radius, std::size_t max_samples, bool are_printed) {
-  double const score = check_pose(level_of(a, 1), level_of(b, 1), b_from_a, gate, max_samples).score();
+  double const score = check_pose(a.level(1), b.level(1), b_from_a, gate, max_samples).score();
   return are_printed && score > 0 ? score * agreement(print_likeness(a, b, b_from_a, gate, radius), score) : score;
 }
 
@@ -225,18 +221,18 @@ PairPose search_pair(SurfacePyramid const& a, SurfacePyramid const& b,
   for (Eigen::Isometry3d const& start : starts) candidates.push_back({start, 0});
   auto const score_all = [&](std::size_t level, double within, std::size_t samples) {
     for (Candidate& candidate : candidates)
-      candidate.score = check_pose(level_of(a, level), level_of(b, level), candidate.b_from_a, within, samples).score();
+      candidate.score = check_pose(a.level(level), b.level(level), candidate.b_from_a, within, samples).score();
   };
   score_all(2, gate, kFewSamples);
   keep_best(candidates, 4 * kLookedAt);
   score_all(2, gate, kSomeSamples);
   keep_distinct(candidates, kLookedAt, a.centroid, radius);
   for (Candidate& candidate : candidates)
-    refine(level_of(a, 2), level_of(b, 2), a, b, 2 * gate, gate, 3, kFewSamples, radius, candidate.b_from_a);
+    refine(a.level(2), b.level(2), a, b, 2 * gate, gate, 3, kFewSamples, radius, candidate.b_from_a);
   score_all(2, 0.6 * gate, kSomeSamples);
   keep_distinct(candidates, kRefined, a.centroid, radius);
   for (Candidate& candidate : candidates)
-    refine(level_of(a, 2), level_of(b, 2), a, b, 2.5 * gate, 0.4 * gate, 15, kSomeSamples, radius, candidate.b_from_a);
+    refine(a.level(2), b.level(2), a, b, 2.5 * gate, 0.4 * gate, 15, kSomeSamples, radius, candidate.b_from_a);
   bool const are_printed = has_print(a) && has_print(b);
   score_all(1, 0.4 * gate, kManySamples);
   if (are_printed)
@@ -246,9 +242,9 @@ PairPose search_pair(SurfacePyramid const& a, SurfacePyramid const& b,
   double best_score = -std::numeric_limits<double>::infinity();
   for (Candidate& candidate : candidates) {
     Misfit const misfit =
-        refine(level_of(a, 1), level_of(b, 1), a, b, gate, 0.15 * gate, 15, kManySamples, radius, candidate.b_from_a);
+        refine(a.level(1), b.level(1), a, b, gate, 0.15 * gate, 15, kManySamples, radius, candidate.b_from_a);
     double const within = std::clamp(4 * misfit.distance, 0.2 * gate, 0.6 * gate);
-    PoseCheck const check = check_pose(level_of(a, 1), level_of(b, 1), candidate.b_from_a, within, kManySamples);
+    PoseCheck const check = check_pose(a.level(1), b.level(1), candidate.b_from_a, within, kManySamples);
     double const likeness = are_printed ? print_likeness(a, b, candidate.b_from_a, 0.2 * gate, radius) : 1;
     double const score = check.score() * agreement(likeness, check.score());
     if (score <= best_score) continue;

@@ -18,10 +18,6 @@ constexpr std::size_t kMostViews = 60;  // among which pairs are tested against 
 constexpr double kAgainst = 0.05;       // of the radius: poses against a firm pair
 constexpr double kPairAccuracy = 0.01;  // of the radius: what a pairwise motion may be off
 
-ViewSurface const& level_of(SurfacePyramid const& view, std::size_t level) {
-  return view.levels[std::min(level, view.levels.size() - 1)];
-}
-
 MatchOptions cost_options(double radius) {
   MatchOptions options;
   options.radius = radius;
@@ -32,14 +28,14 @@ MatchOptions cost_options(double radius) {
 
 double cost_at(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d const& b_from_a,
                MatchOptions const& options) {
-  return match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options).cost;
+  return match_pair(a.level(1), b.level(1), b_from_a, a.centroid, b.centroid, options).cost;
 }
 
 // A few Gauss-Newton steps of one pair alone by projection, shape and tone.
 Eigen::Isometry3d polish(SurfacePyramid const& a, SurfacePyramid const& b, Eigen::Isometry3d b_from_a,
                          MatchOptions options) {
   for (int i = 0; i < 6; ++i) {
-    PairForm form = match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options);
+    PairForm form = match_pair(a.level(1), b.level(1), b_from_a, a.centroid, b.centroid, options);
     if (form.hits_ab + form.hits_ba < 50) break;
     // Scales of this pair, for the next step.
     options.geometry_scale = std::max(0.05, robust_scale(form.geometry.values));
@@ -67,7 +63,7 @@ Measured measured_at(SurfacePyramid const& a, SurfacePyramid const& b, ViewGraph
   PairMeasurement pair{edge.a, edge.b, b_from_a, Matrix6d::Zero(), Vector6d::Zero(), Eigen::Vector3d::Zero()};
   MatchOptions options = cost_options(radius);
   options.hold_free_motions = false;  // else the way there would be held as well
-  PairForm const form = match_pair(level_of(a, 1), level_of(b, 1), b_from_a, a.centroid, b.centroid, options);
+  PairForm const form = match_pair(a.level(1), b.level(1), b_from_a, a.centroid, b.centroid, options);
   pair.center = form.center;
   double const trace = form.information.trace();
   if (trace > 0 && form.hits_ab + form.hits_ba >= 30)
@@ -87,7 +83,7 @@ Measured measure_pair(SurfacePyramid const& a, SurfacePyramid const& b, ViewFeat
   std::vector<Eigen::Isometry3d> candidates{start};
   IcpOptions icp;
   icp.radius = radius;
-  ViewSurface const &coarse_a = level_of(a, 2), &coarse_b = level_of(b, 2);
+  ViewSurface const &coarse_a = a.level(2), &coarse_b = b.level(2);
   candidates.push_back(pairwise_icp(coarse_a, coarse_b, start, icp).b_from_a);
   FeatureMotionOptions feature_options;
   feature_options.threshold = 0.02 * radius;
@@ -168,7 +164,7 @@ std::vector<Eigen::Isometry3d> start_from_pairs(ScanSet const& set, std::vector<
     if (!is_needed[i] || views[i].depths == 0) return;
     ShapeFeatureOptions shape;
     shape.radius = problem.radius;
-    features[i].shape = find_shape_features(level_of(views[i], 1), shape);
+    features[i].shape = find_shape_features(views[i].level(1), shape);
     if (!views[i].levels[0].tone.empty()) features[i].color = find_features(set.views[i].image, views[i].levels[0]);
   });
   for_each_index(

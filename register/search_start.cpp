@@ -36,10 +36,6 @@ struct Link {
 
 bool is_firm(PairPose const& pose) { return pose.verdict == PairPose::Verdict::firm; }
 
-ViewSurface const& middle_level(SurfacePyramid const& view) {
-  return view.levels[std::min<std::size_t>(1, view.levels.size() - 1)];
-}
-
 // How firmly the samples hold a link, as a mean form.
 PairMeasurement measurement_of(Link const& link, std::vector<SurfacePyramid> const& views, double radius) {
   PairMeasurement pair;
@@ -53,7 +49,7 @@ PairMeasurement measurement_of(Link const& link, std::vector<SurfacePyramid> con
   options.use = MatchOptions::Use::shape;
   options.hold_free_motions = false;
   options.geometry_scale = std::max(0.05, link.pose.misfit);
-  PairForm const form = match_pair(middle_level(views[link.a]), middle_level(views[link.b]), pair.b_from_a,
+  PairForm const form = match_pair(views[link.a].level(1), views[link.b].level(1), pair.b_from_a,
                                    views[link.a].centroid, views[link.b].centroid, options);
   pair.center = form.center;
   double const trace = form.information.trace();
@@ -85,9 +81,9 @@ class Search {
           ShapeFeatureOptions options;
           options.radius = radius_;
           options.neighbourhood = kNear;
-          near_[i] = find_shape_features(middle_level(views_[i]), options);
+          near_[i] = find_shape_features(views_[i].level(1), options);
           options.neighbourhood = kWide;
-          wide_[i] = find_shape_features(middle_level(views_[i]), options);
+          wide_[i] = find_shape_features(views_[i].level(1), options);
           if (!views_[i].levels[0].tone.empty()) color_[i] = find_features(set_.views[i].image, views_[i].levels[0]);
         },
         "register: features");
@@ -220,8 +216,8 @@ class Search {
     options.geometry_scale = std::max(0.05, link.pose.misfit);
     options.hold_free_motions = false;
     auto const match = [&] {
-      return match_pair(middle_level(views_[link.a]), middle_level(views_[link.b]), link.pose.b_from_a,
-                        views_[link.a].centroid, views_[link.b].centroid, options);
+      return match_pair(views_[link.a].level(1), views_[link.b].level(1), link.pose.b_from_a, views_[link.a].centroid,
+                        views_[link.b].centroid, options);
     };
     PairForm const first = match();
     options.geometry_share = effective_share(first.geometry.correlation());

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <opencv2/core/mat.hpp>
 #include <vector>
@@ -73,6 +74,8 @@ struct SurfacePyramid {
   Eigen::Vector3d centroid{0, 0, 0};  ///< component-wise median of the points, camera coordinates
   double radius = 0;                  ///< 95 % of the points are nearer to the centroid
   std::size_t depths = 0;
+  /// The coarsest where there are not so many.
+  ViewSurface const& level(std::size_t number) const { return levels[std::min(number, levels.size() - 1)]; }
 };
 
 struct PyramidOptions {
