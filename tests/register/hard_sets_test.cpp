@@ -9,6 +9,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "alignment_checks.h"
 #include "base/random.h"
 #include "range_scene.h"
 #include "register/alignment.h"
@@ -19,15 +20,6 @@ namespace {
 
 using scene::Noise;
 using ::testing::HasSubstr;
-
-constexpr double kDegree = std::numbers::pi / 180;
-
-void expect_finite(Alignment const& got) {
-  for (Eigen::Isometry3d const& pose : got.object_from_camera) EXPECT_TRUE(pose.matrix().allFinite());
-  for (PoseFigures const& pose : got.poses) EXPECT_TRUE(std::isfinite(pose.std_deg) && std::isfinite(pose.std_length));
-  for (PairFigures const& pair : got.pairs)
-    EXPECT_TRUE(std::isfinite(pair.rms) && std::isfinite(pair.median_distance) && std::isfinite(pair.overlap));
-}
 
 ScanSet without_poses(ScanSet set) {
   for (View& view : set.views) view.object_from_camera.reset();

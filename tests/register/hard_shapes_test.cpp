@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "alignment_checks.h"
 #include "range_scene.h"
 #include "register/alignment.h"
 #include "register/pair_form.h"
@@ -15,17 +16,6 @@ namespace {
 
 using scene::Noise;
 using ::testing::HasSubstr;
-
-constexpr double kDegree = std::numbers::pi / 180;
-
-void expect_finite(Alignment const& got) {
-  for (Eigen::Isometry3d const& pose : got.object_from_camera) EXPECT_TRUE(pose.matrix().allFinite());
-  for (PoseFigures const& pose : got.poses)
-    EXPECT_TRUE(std::isfinite(pose.std_deg) && std::isfinite(pose.std_length))
-        << pose.std_deg << " " << pose.std_length;
-  for (PairFigures const& pair : got.pairs)
-    EXPECT_TRUE(std::isfinite(pair.rms) && std::isfinite(pair.median_distance) && std::isfinite(pair.overlap));
-}
 
 // The direction that ends a motion's words.
 Eigen::Vector3d direction_in(std::string const& words) {
