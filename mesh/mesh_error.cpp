@@ -4,8 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "mesh/depth_field.h"
+#include "mesh/pixel_spans.h"
 #include "mesh/surface_links.h"
-#include "mesh/triangle_scan.h"
 
 namespace scanview {
 
@@ -13,18 +14,20 @@ MeshError measure_mesh(RangeImage const& image, TriangleMesh const& mesh) {
   Camera const& camera = image.camera;
   cv::Mat1d nearest(camera.height(), camera.width(), INFINITY);
   for (Eigen::Vector3i const& triangle : mesh.triangles) {
-    Eigen::Vector2d corners[3];
-    double depths[3];
+    DepthTriangle shape;
     for (int i = 0; i < 3; ++i) {
       Eigen::Vector3d const p = mesh.vertices[triangle[i]].cast<double>();
-      corners[i] = camera.project(p);
-      depths[i] = linear_depth(camera, p.z());
+      shape.corner[i] = camera.project(p);
+      shape.depth[i] = linear_depth(camera, p.z());
     }
-    for_each_pixel(corners[0], corners[1], corners[2], camera.width(), camera.height(),
-                   [&](int x, int y, double wa, double wb, double wc) {
-                     double const z = linear_depth(camera, wa * depths[0] + wb * depths[1] + wc * depths[2]);
-                     nearest(y, x) = std::min(nearest(y, x), z);
-                   });
+    DepthPlane const plane = shape.plane();
+    for_each_span(shape.corner[0], shape.corner[1], shape.corner[2], camera.width(), camera.height(),
+                  [&](int y, int begin, int end) {
+                    for (int x = begin; x < end; ++x) {
+                      double const z = linear_depth(camera, plane.at({double(x), double(y)}));
+                      nearest(y, x) = std::min(nearest(y, x), z);
+                    }
+                  });
   }
 
   MeshError result;

@@ -11,7 +11,7 @@ struct MeshError {
   cv::Mat1b covered;  ///< 255 where a triangle covers the pixel's centre
 };
 
-/// Every triangle's depth is taken at the pixel centres it covers, its border included (linear in 1/z under
+/// Every triangle's depth is taken at the pixel centres it covers, a shared edge's once (linear in 1/z under
 /// perspective); where several cover a centre the nearest counts. Linear in the number of pixels covered.
 MeshError measure_mesh(RangeImage const& image, TriangleMesh const& mesh);
 

@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "base/error.h"
+#include "mesh/depth_approximation.h"
 #include "mesh/feather.h"
-#include "mesh/greedy_insertion.h"
 #include "mesh/mesh_error.h"
 #include "mesh/outline.h"
 #include "mesh/surface_links.h"
@@ -15,18 +15,6 @@
 
 namespace scanview {
 namespace {
-
-/// Below three sigma greedy insertion models the noise: of normal errors 4.6 % exceed 2, 0.27 % exceed 3 sigma.
-constexpr double kAutomaticSigmas = 3.0;
-
-cv::Mat1f tolerance_of_pixels(RangeImage const& image, MeshOptions const& options, double tolerance) {
-  double const within = 1 - 1e-6;  // single precision must not round it up
-  if (options.tolerance_kind == MeshOptions::Tolerance::units)
-    return cv::Mat1f(image.depth.size(), float(within * tolerance));
-  cv::Mat1f result;
-  image.sigma.convertTo(result, CV_32F, within * tolerance);
-  return result;
-}
 
 /// How far noise alone may be expected to change the tangent of the angle under which a triangle is seen: one sigma of
 /// a depth difference over the triangle's least height across the picture.
@@ -107,14 +95,13 @@ ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& opti
   image.check();
   ViewMeshResult result;
   result.view_mesh.camera = image.camera;
-  result.tolerance = options.tolerance_kind == MeshOptions::Tolerance::automatic ? kAutomaticSigmas : options.tolerance;
-
   SurfaceLinks const links = find_surface_links(image, options.step_sigmas, options.min_patch_pixels);
   Outline const outline = trace_outline(links);
   context.check_cancelled();
-  cv::Mat1f const tolerance = tolerance_of_pixels(image, options, result.tolerance);
+  DepthApproximation approximation = approximate_depths(image, links, outline, options, context);
+  result.tolerance = approximation.tolerance;
   TriangleMesh& mesh = result.view_mesh.mesh;
-  mesh = triangulate_by_greedy_insertion(image, links, outline, tolerance, options.max_triangles, context);
+  mesh = approximation.triangulation.to_mesh(image.camera);
   keep_well_seen(image, options.max_angle_deg, mesh, result.view_mesh.cos_phi);
 
   MeshError const error = measure_mesh(image, mesh);

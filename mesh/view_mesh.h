@@ -25,9 +25,18 @@ struct ViewMesh {
 };
 
 struct MeshOptions {
+  /// units, sigmas: no pixel is farther from the mesh than `tolerance`, in depth. automatic: triangles are added as
+  /// long as they lower the squared error, in sigmas, by more than noise alone would; five sigma at most.
   enum class Tolerance { units, sigmas, automatic } tolerance_kind = Tolerance::automatic;
-  double tolerance = 3.0;    ///< greatest distance in depth, in units or in multiples of each pixel's sigma
-  int max_triangles = 0;     ///< a view; 0: as many as the tolerance needs
+  double tolerance = 3.0;  ///< in units or in multiples of each pixel's sigma
+  int max_triangles = 0;   ///< a view; 0: as many as the tolerance needs. Less than the outline needs: the outline wins
+  /// How vertices are placed. insertion: the worst pixel becomes one (Garland and Heckbert 1995). probing: a random
+  /// place on the Voronoi edge of highest priority (Darsa 1998, §4.2), for depths that are dear to sample. decimation:
+  /// the full grid loses edges (Lindstrom and Turk 1998; CGAL), slow: the reference.
+  enum class Placement { insertion, probing, decimation } placement = Placement::insertion;
+  /// What follows the placement. none: vertices keep their pixels' depths. depths: least squares of all vertices'
+  /// depths. joint: also flips, moves in the picture, and joining of vertices that can be spared (joint_fit.h).
+  enum class Fit { none, depths, joint } fit = Fit::joint;
   double step_sigmas = 6.0;  ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
   /// Triangles that are seen more grazingly are dropped. Steps have a test of their own, and the weight cos φ lets a
   /// grazing triangle count little: dropping it early would leave holes where no other view looks.

@@ -17,6 +17,7 @@ struct ReferenceRaster {
   cv::Mat1d worst_error;  ///< greatest |depth − image's| of them, where the image has one
   std::size_t object = 0, uncovered = 0, covered_background = 0;
   double max_error = 0;
+  double squares = 0;  ///< of the worst errors, summed
   double max_over_sigma = 0;
 };
 
@@ -61,6 +62,7 @@ inline ReferenceRaster reference_raster(RangeImage const& image, TriangleMesh co
       }
       ++result.object;
       result.uncovered += result.count(y, x) == 0;
+      result.squares += result.worst_error(y, x) * result.worst_error(y, x);
       if (!(result.worst_error(y, x) <= result.max_error)) result.max_error = result.worst_error(y, x);
       double const relative = result.worst_error(y, x) / image.sigma(y, x);
       if (!(relative <= result.max_over_sigma)) result.max_over_sigma = relative;
