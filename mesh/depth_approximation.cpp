@@ -6,9 +6,11 @@
 
 #include "mesh/depth_fit.h"
 #include "mesh/greedy_insertion.h"
+#include "mesh/grid_decimation.h"
 #include "mesh/joint_fit.h"
 #include "mesh/outline_triangulation.h"
 #include "mesh/pixel_spans.h"
+#include "mesh/voronoi_probing.h"
 
 namespace scanview {
 namespace {
@@ -22,6 +24,9 @@ constexpr double kVertexNumbers = 3;
 constexpr double kVertexWorth = 10, kLeastWorth = 1.5;
 /// Tolerances: sums and rounding must not take a pixel just beyond.
 constexpr double kWithin = 0.9995;
+/// Tolerances within which insertion stays before depths are fitted: a fit halves the greatest error, so that little is
+/// left to insert.
+constexpr double kCoarsely = 1.5;
 constexpr int kSweeps = 2, kAutomaticSweeps = 5;
 
 class Approximation {
@@ -40,9 +45,8 @@ class Approximation {
   DepthApproximation run() {
     DepthApproximation result;
     result.tolerance = is_automatic() ? kAutomaticSigmas : options_.tolerance;
-    VertexMaker const maker(image_, links_, tolerance_, options_.fit != MeshOptions::Fit::none);
     triangulation_ = triangulate_outline(image_, links_, outline_, tolerance_);
-    insert_greedily(triangulation_, field_, maker, kWithin, options_.max_triangles, context_);
+    place_vertices();
     fit();
     constexpr int kRounds = 8;
     for (int round = 0; round < kRounds; ++round) {
@@ -55,6 +59,29 @@ class Approximation {
 
  private:
   bool is_automatic() const { return options_.tolerance_kind == MeshOptions::Tolerance::automatic; }
+
+  void place_vertices() {
+    VertexMaker const maker(image_, links_, tolerance_, options_.fit != MeshOptions::Fit::none);
+    int const most = options_.max_triangles;
+    switch (options_.placement) {
+      case MeshOptions::Placement::insertion:
+        if (options_.fit != MeshOptions::Fit::none && !is_automatic()) {
+          insert_greedily(triangulation_, field_, maker, kCoarsely, most, context_);
+          fit_depths(triangulation_, field_, kWithin, scan_errors(triangulation_, field_));
+        }
+        insert_greedily(triangulation_, field_, maker, kWithin, most, context_);
+        return;
+      case MeshOptions::Placement::probing:
+        probe_voronoi_edges(triangulation_, field_, maker, kWithin, most, context_);
+        return;
+      case MeshOptions::Placement::decimation:
+        constexpr double kExactly = 0.01;  // tolerances within which the grid follows every pixel
+        insert_greedily(triangulation_, field_, VertexMaker(image_, links_, tolerance_, false), kExactly, 0, context_);
+        context_.check_cancelled();
+        triangulation_ = decimate_grid(triangulation_, field_, image_.camera, kWithin, most);
+        return;
+    }
+  }
 
   void fit() {
     double limit = kWithin;

@@ -18,34 +18,54 @@ Lanes const& ramp() {
   return values;
 }
 
-/// The errors of a plane along a row. Differences are taken to the depth at the row's begin, so that single precision
-/// loses nothing beside large depths.
+/// The errors of a plane along a row, four pixels at a time. Differences are taken to the depth at the row's begin, so
+/// that single precision loses nothing beside large depths. Lanes beyond the row's end have no weight; what is read for
+/// them is the next row's begin (make_depth_field() keeps room after the last).
 class RowErrors {
  public:
-  RowErrors(DepthField const& field, DepthPlane const& plane, int y, int begin)
-      : depth_(field.depth[y] + begin), weight_(field.weight[y] + begin), slope_(float(plane.slope.x())) {
+  RowErrors(DepthField const& field, DepthPlane const& plane, int y, int begin, int end)
+      : depth_(field.depth[y] + begin),
+        weight_(field.weight[y] + begin),
+        count_(end - begin),
+        slope_(float(plane.slope.x())) {
     double const at = plane.at({double(begin), double(y)});
     base_ = float(at);
     rest_ = float(at - base_);
   }
-  Lanes lanes(int i) const {
-    Lanes const depth = Eigen::Map<Lanes const>(depth_ + i);
-    return (depth - base_) - (slope_ * (ramp() + float(i)) + rest_);
+  /// Calls add(error, weight, column from the row's begin) with four of each.
+  template <typename Add>
+  void for_each_four(Add&& add) const {
+    Lanes index = ramp();
+    int i = 0;
+    for (; i + kLanes <= count_; i += kLanes, index += float(kLanes))
+      add(errors(i, index), Lanes(Eigen::Map<Lanes const>(weight_ + i)), index);
+    if (i == count_) return;
+    Lanes const inside = (index < float(count_)).cast<float>();
+    add(errors(i, index), Lanes(Eigen::Map<Lanes const>(weight_ + i) * inside), index);
   }
-  Lanes weights(int i) const { return Eigen::Map<Lanes const>(weight_ + i); }
-  float one(int i) const { return (depth_[i] - base_) - (slope_ * float(i) + rest_); }
-  float weight(int i) const { return weight_[i]; }
 
  private:
+  Lanes errors(int i, Lanes const& index) const {
+    return (Eigen::Map<Lanes const>(depth_ + i) - base_) - (slope_ * index + rest_);
+  }
+
   float const* depth_;
   float const* weight_;
+  int count_;
   float slope_, base_, rest_;
 };
+
+/// Zeros, with room for four more than there are.
+cv::Mat1f padded_zeros(cv::Size size) {
+  return cv::Mat1f(cv::Mat1f::zeros(size.height + 1, std::max(size.width, kLanes)))
+      .rowRange(0, size.height)
+      .colRange(0, size.width);
+}
 
 }  // namespace
 
 DepthField make_depth_field(RangeImage const& image, SurfaceLinks const& links, cv::Mat1f const& tolerance) {
-  DepthField field{cv::Mat1f::zeros(image.depth.size()), cv::Mat1f::zeros(image.depth.size())};
+  DepthField field{padded_zeros(image.depth.size()), padded_zeros(image.depth.size())};
   bool const perspective = image.camera.is_perspective();
   for (int y = 0; y < field.height(); ++y) {
     float const* const depths = image.depth[y];
@@ -76,29 +96,24 @@ Eigen::Vector2d DepthTriangle::barycentric_slope(int i) const {
 TriangleError scan_error(DepthField const& field, DepthTriangle const& triangle) {
   DepthPlane const plane = triangle.plane();
   TriangleError result;
+  Lanes squares = Lanes::Zero();
   for_each_span(triangle.corner[0], triangle.corner[1], triangle.corner[2], field.width(), field.height(),
                 [&](int y, int begin, int end) {
-                  RowErrors const row(field, plane, y, begin);
-                  int const count = end - begin;
-                  Lanes squares = Lanes::Zero(), worst = Lanes::Zero();
-                  int i = 0;
-                  for (; i + kLanes <= count; i += kLanes) {
-                    Lanes const error = row.lanes(i) * row.weights(i);
-                    squares += error * error;
-                    worst = worst.max(error.abs());
-                  }
-                  float row_squares = squares.sum(), row_worst = worst.maxCoeff();
-                  for (; i < count; ++i) {
-                    float const error = row.one(i) * row.weight(i);
-                    row_squares += error * error;
-                    row_worst = std::max(row_worst, std::abs(error));
-                  }
-                  result.squares += double(row_squares);
+                  Lanes row_squares = Lanes::Zero(), worst = Lanes::Zero();
+                  RowErrors(field, plane, y, begin, end)
+                      .for_each_four([&](Lanes const& error, Lanes const& weight, Lanes const&) {
+                        Lanes const weighted = error * weight;
+                        row_squares += weighted * weighted;
+                        worst = worst.max(weighted.abs());
+                      });
+                  squares += row_squares;
+                  float const row_worst = worst.maxCoeff();
                   if (row_worst > result.worst) {
                     result.worst = row_worst;
                     result.row = y;
                   }
                 });
+  result.squares = double(squares.sum());
   return result;
 }
 
@@ -108,14 +123,16 @@ int find_worst_column(DepthField const& field, DepthTriangle const& triangle, Tr
   for_each_span(triangle.corner[0], triangle.corner[1], triangle.corner[2], field.width(), field.height(),
                 [&](int y, int begin, int end) {
                   if (y != error.row) return;
-                  RowErrors const row(field, plane, y, begin);
                   float worst = -1;
-                  for (int i = 0; i < end - begin; ++i) {
-                    float const here = std::abs(row.one(i) * row.weight(i));
-                    if (here <= worst) continue;
-                    worst = here;
-                    column = begin + i;
-                  }
+                  RowErrors(field, plane, y, begin, end)
+                      .for_each_four([&](Lanes const& error, Lanes const& weight, Lanes const& index) {
+                        for (int k = 0; k < kLanes; ++k) {
+                          float const here = std::abs(error[k] * weight[k]);
+                          if (here <= worst || int(index[k]) >= end - begin) continue;
+                          worst = here;
+                          column = begin + int(index[k]);
+                        }
+                      });
                 });
   return column;
 }
@@ -124,34 +141,22 @@ TriangleSums scan_sums(DepthField const& field, DepthTriangle const& triangle) {
   DepthPlane const plane = triangle.plane();
   Eigen::Vector2d const origin = triangle.corner[0];
   TriangleSums sums;
+  Lanes pixels = Lanes::Zero();
   for_each_span(triangle.corner[0], triangle.corner[1], triangle.corner[2], field.width(), field.height(),
                 [&](int y, int begin, int end) {
-                  RowErrors const row(field, plane, y, begin);
-                  int const count = end - begin;
                   // Over the row, x counted from its begin: w, wi, wii, wr, wri, wrr.
-                  Lanes s0 = Lanes::Zero(), s1 = s0, s2 = s0, r0 = s0, r1 = s0, r2 = s0, n = s0;
-                  auto const add = [&](Lanes const& error, Lanes const& weight, Lanes const& index) {
-                    Lanes const w = weight * weight, wi = w * index, wr = w * error;
-                    s0 += w;
-                    s1 += wi;
-                    s2 += wi * index;
-                    r0 += wr;
-                    r1 += wr * index;
-                    r2 += wr * error;
-                    n += (weight > 0.0f).template cast<float>();
-                  };
-                  int i = 0;
-                  for (; i + kLanes <= count; i += kLanes) add(row.lanes(i), row.weights(i), ramp() + float(i));
-                  for (; i < count; ++i) {
-                    float const w = row.weight(i) * row.weight(i), r = row.one(i);
-                    s0[0] += w;
-                    s1[0] += w * float(i);
-                    s2[0] += w * float(i) * float(i);
-                    r0[0] += w * r;
-                    r1[0] += w * r * float(i);
-                    r2[0] += w * r * r;
-                    n[0] += row.weight(i) > 0;
-                  }
+                  Lanes s0 = Lanes::Zero(), s1 = s0, s2 = s0, r0 = s0, r1 = s0, r2 = s0;
+                  RowErrors(field, plane, y, begin, end)
+                      .for_each_four([&](Lanes const& error, Lanes const& weight, Lanes const& index) {
+                        Lanes const w = weight * weight, wi = w * index, wr = w * error;
+                        s0 += w;
+                        s1 += wi;
+                        s2 += wi * index;
+                        r0 += wr;
+                        r1 += wr * index;
+                        r2 += wr * error;
+                        pixels += (weight > 0.0f).cast<float>();
+                      });
                   double const x0 = begin - origin.x(), dy = y - origin.y();
                   double const w = s0.sum(), wi = s1.sum(), wii = s2.sum(), wr = r0.sum(), wri = r1.sum();
                   double const wx = wi + x0 * w, wrx = wri + x0 * wr;
@@ -165,8 +170,8 @@ TriangleSums scan_sums(DepthField const& field, DepthTriangle const& triangle) {
                   sums.wrx += wrx;
                   sums.wry += dy * wr;
                   sums.wrr += r2.sum();
-                  sums.pixels += int(n.sum());
                 });
+  sums.pixels = int(pixels.sum());
   return sums;
 }
 

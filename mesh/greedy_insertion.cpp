@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <queue>
+#include <unordered_set>
 #include <vector>
 
 #include "mesh/local_surface.h"
@@ -57,9 +58,23 @@ class GreedyInsertion {
       return;
     }
     auto const added = triangulation_.insert(t, point, maker_.depth_at(x, y));
-    if (!added) return;
+    if (!added) {
+      pin(t, point, maker_.depth_at(x, y));
+      return;
+    }
     settle(*added);
     while (split_border_around(*added)) {
+    }
+  }
+
+  /// Takes a vertex that was fitted away from its pixel back to it, once.
+  void pin(int t, Eigen::Vector2d const& point, double depth) {
+    for (int const v : triangulation_.triangle(t).vertex) {
+      if (triangulation_.vertex(v).position != point || !pinned_.insert(v).second) continue;
+      triangulation_.set_depth(v, depth);
+      triangulation_.triangles_around(v, around_);
+      for (int const around : around_) look_at(around);
+      return;
     }
   }
 
@@ -100,6 +115,7 @@ class GreedyInsertion {
   std::vector<std::uint32_t> stamps_;  ///< of the latest look at a triangle
   std::uint32_t stamp_ = 0;
   std::vector<int> around_;
+  std::unordered_set<int> pinned_;
 };
 
 }  // namespace
@@ -110,6 +126,7 @@ double VertexMaker::depth_at(int x, int y) const {
 }
 
 int VertexMaker::split_border(DepthTriangulation& triangulation, int t, Eigen::Vector2d const& point) const {
+  if (!smooth_) return -1;
   constexpr double kCos = -0.7071;  // 135 degrees: beyond it a triangle says nothing about the surface's normal
   constexpr double kApart = 0.5;    // pixels, from the ends
   DepthTriangle const shape = triangulation.shape(t);

@@ -12,11 +12,12 @@ class VertexMaker {
   VertexMaker(RangeImage const& image, SurfaceLinks const& links, cv::Mat1f const& tolerance, bool smooth)
       : image_(image), links_(links), tolerance_(tolerance), smooth_(smooth) {}
 
+  bool is_perspective() const { return image_.camera.is_perspective(); }
   /// Linear depth of a vertex at a pixel of the object: its own, or, smooth, that of fit_local_surface().
   double depth_at(int x, int y) const;
   /// Halves a border edge of the triangle that is long beside a point so near to it (an angle of more than 135 degrees
   /// at the point), at the foot of the point, so that no sliver lies along it whose normal means nothing. The vertex
-  /// that it made, or −1 where no edge is so.
+  /// that it made, or −1 where no edge is so, or where vertices are plain, not smooth.
   int split_border(DepthTriangulation& triangulation, int t, Eigen::Vector2d const& point) const;
 
  private:

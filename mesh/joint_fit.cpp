@@ -209,7 +209,7 @@ class JointFit {
     matrix(2, 2) += kTied * before.squares / (reach * reach);
     Eigen::Vector3d change = matrix.ldlt().solve(right);
     if (!change.allFinite()) return;
-    constexpr double kWorthwhile = 1e-3;
+    constexpr double kWorthwhile = 1e-2;
     if (right.dot(change) < kWorthwhile * before.squares) return;
     constexpr double kFarthest = 0.4;
     double const length = change.tail<2>().norm();
@@ -248,7 +248,7 @@ class JointFit {
     for (int v = 0; v < int(m_.vertices().size()); ++v) {
       if (m_.vertex(v).triangle < 0 || m_.vertex(v).on_border) continue;
       auto const [loss, squares] = bump(v);
-      if (loss < 2 * options_.limit && (options_.worth == 0 || squares < 3 * options_.worth))
+      if (loss < 3 * options_.limit && (options_.worth == 0 || squares < 3 * options_.worth))
         order.push_back({loss, v});
     }
     std::sort(order.begin(), order.end(),

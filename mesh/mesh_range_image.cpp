@@ -45,7 +45,7 @@ void keep_well_seen(RangeImage const& image, double max_angle_deg, TriangleMesh&
     Eigen::Vector3d ray(0, 0, 1);
     if (image.camera.is_perspective()) ray = p[0] + p[1] + p[2];
     double const cosine = std::min(-normal.dot(ray) / (normal.norm() * ray.norm()), 1.0);
-    if (!(cosine >= least_cos)) {  // also those without area
+    if (max_angle_deg < 90 && !(cosine >= least_cos)) {  // also those without area
       if (!(cosine >= kAlwaysGrazing)) continue;
       double const tangent = std::sqrt(1 - cosine * cosine) / cosine;
       if (tangent - kExplained * tangent_sigma(image, p) > greatest) continue;
@@ -85,7 +85,7 @@ void MeshOptions::validate() const {
           "tolerance must be greater than 0");
   require(max_triangles >= 0, "max_triangles must not be negative");
   require(std::isfinite(step_sigmas) && step_sigmas > 0, "step_sigmas must be greater than 0");
-  require(max_angle_deg > 0 && max_angle_deg < 90, "max_angle_deg must be between 0 and 90");
+  require(max_angle_deg > 0 && max_angle_deg <= 90, "max_angle_deg must be greater than 0 and at most 90");
   require(feather_px >= 1 && feather_px <= 65536, "feather_px must be between 1 and 65536");
   require(min_patch_pixels >= 1, "min_patch_pixels must be at least 1");
 }

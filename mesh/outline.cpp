@@ -42,9 +42,9 @@ class CrackGraph {
   }
   void erase(Eigen::Vector2i corner, int direction) { *const_cast<uchar*>(crack(corner, direction)) = 0; }
   int degree(Eigen::Vector2i corner) const {
-    int count = 0;
-    for (int direction = 0; direction < 4; ++direction) count += has(corner, direction);
-    return count;
+    int const i = corner.x(), j = corner.y();
+    return horizontal_(j, i) + vertical_(j, i) + (i > 0 ? horizontal_(j, i - 1) : 0) +
+           (j > 0 ? vertical_(j - 1, i) : 0);
   }
   /// The pixels beside the crack that leads from `corner` in `direction`.
   static Gate gate(Eigen::Vector2i corner, int direction) {
@@ -102,15 +102,19 @@ Chain follow(CrackGraph& graph, cv::Mat1b const& is_node, Eigen::Vector2i corner
 
 std::vector<Chain> find_chains(CrackGraph graph) {
   cv::Mat1b is_node(graph.height() + 1, graph.width() + 1);
+  std::vector<Eigen::Vector2i> corners;  // where cracks meet
   for (int j = 0; j <= graph.height(); ++j)
-    for (int i = 0; i <= graph.width(); ++i) is_node(j, i) = graph.degree({i, j}) != 2;
+    for (int i = 0; i <= graph.width(); ++i) {
+      int const degree = graph.degree({i, j});
+      is_node(j, i) = degree != 2;
+      if (degree > 0) corners.emplace_back(i, j);
+    }
   std::vector<Chain> chains;
   for (int nodes_first = 1; nodes_first >= 0; --nodes_first)
-    for (int j = 0; j <= graph.height(); ++j)
-      for (int i = 0; i <= graph.width(); ++i)
-        for (int direction = 0; direction < 4; ++direction)
-          if (is_node(j, i) == nodes_first && graph.has({i, j}, direction))
-            chains.push_back(follow(graph, is_node, {i, j}, direction));
+    for (Eigen::Vector2i const& corner : corners)
+      for (int direction = 0; direction < 4; ++direction)
+        if (is_node(corner.y(), corner.x()) == nodes_first && graph.has(corner, direction))
+          chains.push_back(follow(graph, is_node, corner, direction));
   return chains;
 }
 

@@ -39,10 +39,10 @@ struct MeshOptions {
   enum class Fit { none, depths, joint } fit = Fit::joint;
   double step_sigmas = 6.0;  ///< a depth jump beyond so many sigma plus what the slope explains is a step edge
   /// Triangles that are seen more grazingly are dropped. Steps have a test of their own, and the weight cos φ lets a
-  /// grazing triangle count little: dropping it early would leave holes where no other view looks.
+  /// grazing triangle count little: dropping it early would leave holes where no other view looks. 90: none is dropped.
   double max_angle_deg = 87.0;
   int feather_px = 16;       ///< distance from the boundary at which the feather weight is full
-  int min_patch_pixels = 4;  ///< smaller groups of pixels on one surface are not meshed: they count as uncovered
+  int min_patch_pixels = 2;  ///< smaller groups of pixels on one surface are not meshed: they count as uncovered
   void validate() const;
 };
 

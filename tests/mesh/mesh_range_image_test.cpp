@@ -305,7 +305,7 @@ TEST(MeshOptions, RefusesWhatMakesNoSense) {
   refused([](MeshOptions& o) { o.tolerance_kind = MeshOptions::Tolerance::sigmas, o.tolerance = kNaN; });
   refused([](MeshOptions& o) { o.max_triangles = -1; });
   refused([](MeshOptions& o) { o.step_sigmas = 0; });
-  refused([](MeshOptions& o) { o.max_angle_deg = 90; });
+  refused([](MeshOptions& o) { o.max_angle_deg = 90.5; });
   refused([](MeshOptions& o) { o.feather_px = 0; });
   refused([](MeshOptions& o) { o.min_patch_pixels = 0; });
 }
