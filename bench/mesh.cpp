@@ -162,7 +162,6 @@ void bench_map(DepthMap const& map, Settings const& settings, Curves& curves) {
     Row const insertion = note("plain insertion", run_ours(map, "plain insertion, one piece", plain(options), true));
     MeshOptions same_count = options;
     same_count.max_triangles = int(insertion.triangles);
-    same_count.tolerance = tolerance / 1000;
     Row const piece =
         note("scanview, one piece", run_ours(map, "scanview, one piece, as many", in_one_piece(same_count), true));
     Row const torn_many = run_ours(map, "scanview, as many", same_count, false);
@@ -267,7 +266,6 @@ void bench_set(fs::path const& folder) {
     MeshOptions bare = options;
     bare.fit = MeshOptions::Fit::none;
     auto const counts = measure(fmt::format("insertion alone, {} sigma", sigmas), bare, nullptr);
-    options.tolerance = sigmas / 1000;
     measure("scanview, as many", options, &counts);
   }
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,11 @@ RegisterRequest resolve(RegisterFlags const& flags, std::vector<std::string> con
 struct MeshFlags {
   std::string tolerance = "auto";
   int triangles = 0;
+  int levels = 1;
+  std::string placement = "insertion", fit = "joint";
+  std::filesystem::path marks;
 };
 void add_mesh_flags(CLI::App& verb, MeshFlags& flags);
-MeshOptions resolve(MeshFlags const& flags, std::vector<std::string> const& settings);
+MeshRequest resolve(MeshFlags const& flags, std::vector<std::string> const& settings);
 
 }  // namespace scanview

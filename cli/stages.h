@@ -47,6 +47,11 @@ struct RegisterRequest {
   RegisterOptions options;
   int exposure = 1;  ///< 1: also bring the views to one exposure (View::gain); 0: all gains 1
 };
+struct MeshRequest {
+  MeshOptions options;
+  int levels = 1;  ///< of detail: mesh.ply is level 0, every other has twice the tolerance of the one before
+  std::filesystem::path marks;  ///< mesh_marks.h; empty: none
+};
 struct EvaluateRequest {
   std::string hold_out = "one";  ///< one (each in turn), every:N, or names with commas
 };
@@ -59,7 +64,7 @@ StageOutcome import_stage(std::filesystem::path const& folder, ImportRequest con
                           Context& context);
 StageOutcome register_stage(std::filesystem::path const& folder, RegisterRequest const& request, StageMode mode,
                             Context& context);
-StageOutcome mesh_stage(std::filesystem::path const& folder, MeshOptions const& options, StageMode mode,
+StageOutcome mesh_stage(std::filesystem::path const& folder, MeshRequest const& request, StageMode mode,
                         Context& context);
 /// Pictures for the report: an orbit and from halfway between views.
 StageOutcome render_stage(std::filesystem::path const& folder, StageMode mode, Context& context);

@@ -56,7 +56,7 @@ class Pipeline {
       : arguments_(arguments),
         session_(session),
         register_request_(resolve(arguments.register_flags, session.settings)),
-        mesh_options_(resolve(arguments.mesh_flags, session.settings)) {
+        mesh_request_(resolve(arguments.mesh_flags, session.settings)) {
     if (!fs::exists(arguments.input)) throw Error(ErrorCode::bad_input, arguments.input, "does not exist");
     folder_ = arguments.output;
     if (folder_.empty()) {
@@ -92,7 +92,7 @@ class Pipeline {
       return import_stage(folder_, import_, mode, context);
     }
     if (verb == "register") return register_stage(folder_, register_request_, mode, context);
-    if (verb == "mesh") return mesh_stage(folder_, mesh_options_, mode, context);
+    if (verb == "mesh") return mesh_stage(folder_, mesh_request_, mode, context);
     if (verb == "render") return render_stage(folder_, mode, context);
     return evaluate_stage(folder_, {arguments_.hold_out}, mode, context);
   }
@@ -127,7 +127,7 @@ class Pipeline {
   std::optional<AcquireRequest> acquire_;  ///< the input is a capture
   ImportRequest import_;
   RegisterRequest register_request_;
-  MeshOptions mesh_options_;
+  MeshRequest mesh_request_;
 };
 
 }  // namespace

@@ -27,7 +27,7 @@ constexpr double kWithin = 0.9995;
 /// Tolerances within which insertion stays before depths are fitted: a fit halves the greatest error, so that little is
 /// left to insert.
 constexpr double kCoarsely = 1.5;
-constexpr int kSweeps = 2, kAutomaticSweeps = 5;
+constexpr int kSweeps = 2, kSpendingSweeps = 4, kAutomaticSweeps = 5;
 
 class Approximation {
  public:
@@ -93,13 +93,32 @@ class Approximation {
     if (options_.fit != MeshOptions::Fit::joint) return;
     JointFitOptions joint;
     joint.limit = limit;
-    joint.fewer = !is_full();
     joint.sweeps = kSweeps;
+    joint.max_triangles = options_.max_triangles;
     if (is_automatic() && !is_full()) {
       fit_as_noise_allows(joint, std::move(errors));
-    } else {
-      fit_jointly(triangulation_, field_, joint, std::move(errors), context_);
+      return;
     }
+    joint.fewer = !is_full();
+    if (joint.fewer) errors = fit_jointly(triangulation_, field_, joint, std::move(errors), context_);
+    if (joint.fewer && joint.max_triangles == 0) return;
+    // A number of triangles was asked for: they are used up, as long as they do not model noise.
+    joint.fewer = false;
+    joint.sweeps = kSpendingSweeps;
+    joint.worth = kVertexWorth * mean_noise();
+    fit_jointly(triangulation_, field_, joint, std::move(errors), context_);
+  }
+
+  /// Of the squared sigma, in squared tolerances.
+  double mean_noise() const {
+    double sum = 0;
+    for (int y = 0; y < field_.height(); ++y)
+      for (int x = 0; x < field_.width(); ++x) {
+        if (!links_.object(y, x)) continue;
+        double const sigma = image_.sigma(y, x) / tolerance_(y, x);
+        sum += sigma * sigma;
+      }
+    return object_pixels_ > 0 ? sum / object_pixels_ : 0;
   }
 
   /// Adds and joins vertices as they pay. What a mesh of triangles leaves of a smooth surface, its bias, squared, falls

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "base/image_file.h"
-#include "mesh/texture_split.h"
+#include "mesh/textured_mesh.h"
 #include "mesh/view_mesh.h"
 
 // Khronos, "glTF 2.0 Specification": §4.4 binary container, §3.6.2 accessors; KHR_materials_unlit.
@@ -126,14 +126,13 @@ class GlbWriter {
 
 int add_mesh(GlbWriter& writer, ViewMesh const& view_mesh, View const& view, double greatest_gain) {
   Camera const& camera = view_mesh.camera;
-  constexpr double kHalfTexel = 0.5;
-  TriangleMesh const mesh = split_for_plain_texture(camera, view_mesh.mesh, kHalfTexel);
+  TexturedMesh const textured = textured_mesh(view_mesh, view);
+  TriangleMesh const& mesh = textured.mesh;
   std::vector<float> positions, texture, feather;
+  for (Eigen::Vector2f const& st : textured.plain) texture.insert(texture.end(), {st.x(), st.y()});
   for (Eigen::Vector3f const& vertex : mesh.vertices) {
     Eigen::Vector2d const pixel = camera.project(vertex.cast<double>());
     positions.insert(positions.end(), {vertex.x(), vertex.y(), vertex.z()});
-    texture.push_back(float((pixel.x() + 0.5) / camera.width()));
-    texture.push_back(float((pixel.y() + 0.5) / camera.height()));
     int const x = std::clamp(int(std::lround(pixel.x())), 0, camera.width() - 1);
     int const y = std::clamp(int(std::lround(pixel.y())), 0, camera.height() - 1);
     feather.push_back(float(view_mesh.feather(y, x)) / 255.0f);
@@ -148,11 +147,11 @@ int add_mesh(GlbWriter& writer, ViewMesh const& view_mesh, View const& view, dou
   Json& surface = material["pbrMetallicRoughness"];
   surface["baseColorFactor"] = {view.gain[0] / greatest_gain, view.gain[1] / greatest_gain,
                                 view.gain[2] / greatest_gain, 1.0};
-  if (!view.image.color.empty()) {
+  if (!textured.picture.empty()) {
     int const picture =
         writer.add("images", {{"name", view.name},
                               {"mimeType", "image/jpeg"},
-                              {"bufferView", writer.add_buffer_view(encode_jpeg(view.image.color, 92))}});
+                              {"bufferView", writer.add_buffer_view(encode_jpeg(textured.picture, 92))}});
     surface["baseColorTexture"] = {{"index", writer.add("textures", {{"sampler", 0}, {"source", picture}})}};
   }
   Json const primitive = {{"attributes",

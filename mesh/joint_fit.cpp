@@ -2,7 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <climits>
 #include <cmath>
+#include <optional>
 
 #include "mesh/depth_fit.h"
 
@@ -29,7 +31,7 @@ class JointFit {
       context_.check_cancelled();
       if (options_.worth > 0) add_vertices();
       flip_edges();
-      if (options_.fewer) join_vertices();
+      if (options_.fewer) join_vertices(options_.worth > 0 ? options_.worth : INFINITY, INT_MAX);
       move_vertices();
       errors_ = fit_depths(m_, field_, options_.limit, std::move(errors_));
     }
@@ -101,22 +103,38 @@ class JointFit {
     return true;
   }
 
-  /// Puts vertices into the middles of triangles where that pays.
+  /// Puts vertices where they pay most.
   void add_vertices() {
-    int const count = int(m_.triangles().size());
-    for (int t = 0; t < count; ++t)
-      if (m_.alive(t)) try_add(t);
+    std::vector<Offer> offers = best_offers();
+    if (options_.max_triangles > 0 && is_full() && !offers.empty()) {
+      constexpr int kExchanged = 20;  // at most one of so many vertices, a sweep
+      std::size_t const count = std::min(offers.size(), m_.vertices().size() / kExchanged + 1);
+      join_vertices(offers[count - 1].gain / 2, int(count));
+      offers = best_offers();
+    }
+    std::vector<char> changed(m_.triangles().size(), 0);
+    for (Offer const& offer : offers) {
+      if (is_full()) return;
+      int const next = offer.edge >= 0 ? m_.triangle(offer.triangle).next[offer.edge] : -1;
+      if (changed[offer.triangle] || next >= int(changed.size()) || (next >= 0 && changed[next])) continue;
+      changed[offer.triangle] = 1;
+      if (next >= 0) changed[next] = 1;
+      take(offer, next);
+    }
   }
+
+  bool is_full() const { return options_.max_triangles > 0 && m_.count() + 2 > options_.max_triangles; }
 
   /// A place for a vertex, the depth there that lowers the squares most, and by how much.
   struct Offer {
-    Eigen::Vector2d place;
+    int triangle = -1, edge = -1;  ///< in the triangle, or on its edge opposite that corner
+    Eigen::Vector2d place{0, 0};
     double depth = 0, old_depth = 0, gain = 0;
   };
 
   /// At a place in the triangle, or on the edge opposite `edge` that it shares with its neighbour.
   Offer offer_at(int t, int edge, Eigen::Vector2d const& place) const {
-    Offer offer{place, 0, m_.shape(t).plane().at(place), 0};
+    Offer offer{t, edge, place, 0, m_.shape(t).plane().at(place), 0};
     double matrix = 0, right = 0;
     auto const add_parts = [&](int of, int without) {
       DepthTriangle const whole = m_.shape(of);
@@ -138,30 +156,40 @@ class JointFit {
     return offer;
   }
 
-  void try_add(int t) {
+  /// Of every triangle the best, where it gains more than a vertex is worth, the best of all first.
+  std::vector<Offer> best_offers() const {
+    std::vector<Offer> offers;
+    for (int t = 0; t < int(m_.triangles().size()); ++t)
+      if (m_.alive(t) && errors_[t].squares > options_.worth)
+        if (Offer const offer = best_offer(t); offer.gain > options_.worth) offers.push_back(offer);
+    std::sort(offers.begin(), offers.end(), [](Offer const& a, Offer const& b) {
+      return a.gain != b.gain ? a.gain > b.gain : a.triangle < b.triangle;
+    });
+    return offers;
+  }
+
+  /// In its middle, or in the middle of its longest edge.
+  Offer best_offer(int t) const {
     constexpr int kLeastPixels = 3;
     DepthTriangle const whole = m_.shape(t);
-    if (whole.turn() < 2 * kLeastPixels || !(least_height(whole) > 2 * kLeastHeight)) return;
-    Offer best = offer_at(t, -1, (whole.corner[0] + whole.corner[1] + whole.corner[2]) / 3);
+    if (whole.turn() < 2 * kLeastPixels || !(least_height(whole) > 2 * kLeastHeight)) return {};
+    Offer const inside = offer_at(t, -1, (whole.corner[0] + whole.corner[1] + whole.corner[2]) / 3);
     int longest = 0;
     auto const length = [&](int i) { return (whole.corner[(i + 1) % 3] - whole.corner[(i + 2) % 3]).squaredNorm(); };
     for (int i = 1; i < 3; ++i)
       if (length(i) > length(longest)) longest = i;
-    int edge = -1;
     int const next = m_.triangle(t).next[longest];
-    if (next >= 0 && least_height(m_.shape(next)) > 2 * kLeastHeight) {
-      Offer const offer = offer_at(t, longest, (whole.corner[(longest + 1) % 3] + whole.corner[(longest + 2) % 3]) / 2);
-      if (offer.gain > best.gain) {
-        best = offer;
-        edge = longest;
-      }
-    }
-    if (!(best.gain > options_.worth)) return;
+    if (next < 0 || !(least_height(m_.shape(next)) > 2 * kLeastHeight)) return inside;
+    Offer const on_edge = offer_at(t, longest, (whole.corner[(longest + 1) % 3] + whole.corner[(longest + 2) % 3]) / 2);
+    return on_edge.gain > inside.gain ? on_edge : inside;
+  }
+
+  void take(Offer const& offer, int next) {
     Before before;
-    add(before, t);
-    if (edge >= 0) add(before, next);
-    std::optional<int> const v =
-        edge < 0 ? m_.insert(t, best.place, best.depth) : m_.split_edge(t, edge, best.place, best.depth);
+    add(before, offer.triangle);
+    if (next >= 0) add(before, next);
+    std::optional<int> const v = next < 0 ? m_.insert(offer.triangle, offer.place, offer.depth)
+                                          : m_.split_edge(offer.triangle, offer.edge, offer.place, offer.depth);
     if (!v) return;
     errors_.resize(m_.triangles().size());
     m_.triangles_around(*v, around_);
@@ -171,7 +199,7 @@ class JointFit {
       beyond = beyond || is_beyond(before, errors_[n]);
     }
     if (!beyond) return;
-    m_.set_depth(*v, best.old_depth);
+    m_.set_depth(*v, offer.old_depth);
     for (int const n : around_) errors_[n] = scan_error(field_, m_.shape(n));
   }
 
@@ -239,7 +267,8 @@ class JointFit {
     return true;
   }
 
-  void join_vertices() {
+  /// Joins vertices that can be spared, where that adds less than `most_loss` to the squares, `most` at most.
+  void join_vertices(double most_loss, int most) {
     struct Spare {
       double loss;
       int vertex;
@@ -248,12 +277,12 @@ class JointFit {
     for (int v = 0; v < int(m_.vertices().size()); ++v) {
       if (m_.vertex(v).triangle < 0 || m_.vertex(v).on_border) continue;
       auto const [loss, squares] = bump(v);
-      if (loss < 3 * options_.limit && (options_.worth == 0 || squares < 3 * options_.worth))
-        order.push_back({loss, v});
+      if (loss < 3 * options_.limit && squares < 3 * most_loss) order.push_back({loss, v});
     }
     std::sort(order.begin(), order.end(),
               [](Spare const& a, Spare const& b) { return a.loss != b.loss ? a.loss < b.loss : a.vertex < b.vertex; });
-    for (Spare const& spare : order) try_join(spare.vertex);
+    for (Spare const& spare : order)
+      if (try_join(spare.vertex, most_loss) && --most == 0) return;
   }
 
   /// How far a vertex stands off the plane of its neighbours, in tolerances, and what squared error that would leave:
@@ -298,7 +327,7 @@ class JointFit {
     return change;
   }
 
-  void try_join(int v) {
+  bool try_join(int v, double most_loss) {
     m_.triangles_around(v, around_);
     Before before;
     for (int const t : around_) add(before, t);
@@ -325,18 +354,18 @@ class JointFit {
         if (!good) break;
         TriangleError const error = scan_error(field_, shape);
         squares += error.squares;
-        good = error.worst <= options_.limit && squares < least &&
-               (options_.worth == 0 || squares < before.squares + options_.worth);
+        good = error.worst <= options_.limit && squares < least && squares < before.squares + most_loss;
         if (!good) break;
       }
       if (!good) continue;
       least = squares;
       best = u;
     }
-    if (best < 0) return;
+    if (best < 0) return false;
     m_.collapse(v, best);
     for (int const t : around_)
       if (m_.alive(t)) errors_[t] = scan_error(field_, m_.shape(t));
+    return true;
   }
 
   DepthTriangulation& m_;

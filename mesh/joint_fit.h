@@ -12,8 +12,11 @@ struct JointFitOptions {
   int sweeps = 2;     ///< over all edges and vertices
   bool fewer = true;  ///< join vertices where the limit allows; else the number of triangles stays
   /// A vertex is worth so much of the squared error, in tolerances: new ones are put where they lower it by more, and
-  /// vertices are joined only where that costs less. 0: neither.
+  /// vertices are joined only where that costs less. 0: none is put, and what joining costs does not matter.
   double worth = 0;
+  /// Greater than 0: new vertices, those first that lower the squares most, make no more triangles than this; once so
+  /// many are there, vertices whose loss costs less than half of what others gain are exchanged for those.
+  int max_triangles = 0;
 };
 
 /// Lowers the squared error of a triangulation by changing what is connected with what and where its vertices are, at

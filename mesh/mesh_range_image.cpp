@@ -90,12 +90,24 @@ void MeshOptions::validate() const {
   require(min_patch_pixels >= 1, "min_patch_pixels must be at least 1");
 }
 
-ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& options, Context& context) {
+ViewMeshResult mesh_range_image(RangeImage const& whole, MeshOptions const& options, Context& context,
+                                MeshMarks const& marks) {
   options.validate();
-  image.check();
+  whole.check();
+  RangeImage image = whole;
+  if (!marks.empty()) {
+    for (cv::Mat* plane : {static_cast<cv::Mat*>(&image.depth), static_cast<cv::Mat*>(&image.sigma),
+                           static_cast<cv::Mat*>(&image.classes)})
+      *plane = plane->clone();
+    apply_polygons(marks, image);
+  }
   ViewMeshResult result;
   result.view_mesh.camera = image.camera;
-  SurfaceLinks const links = find_surface_links(image, options.step_sigmas, options.min_patch_pixels);
+  SurfaceLinks links = find_surface_links(image, options.step_sigmas, options.min_patch_pixels);
+  if (!marks.cut.empty()) {
+    apply_cuts(marks, links);
+    drop_small_patches(links, options.min_patch_pixels);
+  }
   Outline const outline = trace_outline(links);
   context.check_cancelled();
   DepthApproximation approximation = approximate_depths(image, links, outline, options, context);

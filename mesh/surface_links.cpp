@@ -117,6 +117,8 @@ void heal_single_cracks(SurfaceLinks& links) {
   for (cv::Point const& p : down) links.down(p) = 1;
 }
 
+}  // namespace
+
 void drop_small_patches(SurfaceLinks& links, int min_patch_pixels) {
   int const width = links.object.cols, height = links.object.rows;
   Patches patches(std::size_t(width) * height);
@@ -135,8 +137,6 @@ void drop_small_patches(SurfaceLinks& links, int min_patch_pixels) {
         ++links.dropped;
       }
 }
-
-}  // namespace
 
 SurfaceLinks find_surface_links(RangeImage const& image, double step_sigmas, int min_patch_pixels) {
   int const width = image.camera.width(), height = image.camera.height();

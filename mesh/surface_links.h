@@ -36,5 +36,7 @@ struct SurfaceLinks {
 /// of 45°. A step of one pixel's length inside one surface is none. Patches (pixels that are linked, directly
 /// or not) of fewer than `min_patch_pixels` are dropped. Linear in the number of pixels.
 SurfaceLinks find_surface_links(RangeImage const& image, double step_sigmas, int min_patch_pixels);
+/// Drops patches again, after links were cut.
+void drop_small_patches(SurfaceLinks& links, int min_patch_pixels);
 
 }  // namespace scanview

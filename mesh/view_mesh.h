@@ -7,6 +7,7 @@
 #include "base/context.h"
 #include "base/html.h"
 #include "calib/camera.h"
+#include "mesh/mesh_marks.h"
 #include "mesh/triangle_mesh.h"
 
 namespace scanview {
@@ -29,7 +30,8 @@ struct MeshOptions {
   /// long as they lower the squared error, in sigmas, by more than noise alone would; five sigma at most.
   enum class Tolerance { units, sigmas, automatic } tolerance_kind = Tolerance::automatic;
   double tolerance = 3.0;  ///< in units or in multiples of each pixel's sigma
-  int max_triangles = 0;   ///< a view; 0: as many as the tolerance needs. Less than the outline needs: the outline wins
+  int max_triangles = 0;   ///< a view, used up where more do not model noise alone; 0: as many as the tolerance needs.
+                           ///< Less than the outline needs: the outline wins
   /// How vertices are placed. insertion: the worst pixel becomes one (Garland and Heckbert 1995). probing: a random
   /// place on the Voronoi edge of highest priority (Darsa 1998, §4.2), for depths that are dear to sample. decimation:
   /// the full grid loses edges (Lindstrom and Turk 1998; CGAL), slow: the reference.
@@ -61,20 +63,21 @@ struct ViewMeshResult {
 
 /// Meshes one range image. The outline of what has depth and the step edges become polylines between the pixels, within
 /// half a pixel of their sides (outline.h, surface_links.h): constraints of a Delaunay triangulation (CGAL), each side
-/// with its own vertices, so that no triangle spans a step and a mesh covers exactly the object's pixels. Greedy
-/// insertion of the worst pixel (Garland and Heckbert 1995) follows until every pixel is within tolerance, measured on
-/// the single precision vertices. Automatic: three sigma, below which insertion would model the noise. Patches of
+/// with its own vertices, so that no triangle spans a step and a mesh covers exactly the object's pixels. Vertices are
+/// placed and fitted inside (depth_approximation.h); the tolerance holds on the single precision vertices. Patches of
 /// fewer than min_patch_pixels and grazing triangles are left out: `uncovered` counts their pixels. The normal
 /// (b − a) × (c − a) of a triangle points towards the camera. An image with too few depths for a triangle gives an
-/// empty mesh. Where max_triangles is less than the outline needs, the outline wins. About n log n; one thread.
-ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& options, Context& context);
+/// empty mesh. About n log n; one thread.
+/// `marks` restrict and cut it by hand (mesh_marks.h).
+ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& options, Context& context,
+                                MeshMarks const& marks = {});
 
 /// mesh.ply (exact, with `cos` a triangle) and feather.png of one view; reading checks sizes and indices.
 void write_view_mesh(std::filesystem::path const& view_folder, ViewMesh const& view_mesh);
 ViewMesh read_view_mesh(std::filesystem::path const& view_folder, Camera const& camera);
 
-/// GLB for other programs (DESIGN §3): y up, z backward by a node transform that also holds the unit; plain (s, t),
-/// with triangles split where that would be off by more than half a texel. Embeds the colour picture.
+/// GLB for other programs (DESIGN §3): y up, z backward by a node transform that also holds the unit; triangles and
+/// picture are those of textured_mesh().
 std::string encode_glb(std::vector<ViewMesh const*> const& meshes, ScanSet const& set,
                        std::vector<std::size_t> const& view_indices);
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "viewer/view_based/padded_texture.h"
+#include "mesh/padded_texture.h"
 
 namespace scanview {
 namespace {

@@ -1,4 +1,4 @@
-#include "viewer/view_based/padded_texture.h"
+#include "mesh/padded_texture.h"
 
 #include <opencv2/imgproc.hpp>
 #include <vector>
