@@ -21,6 +21,7 @@ Json to_json(MeshOptions const& options) {
           {"step_sigmas", options.step_sigmas},
           {"max_angle_deg", options.max_angle_deg},
           {"feather_px", options.feather_px},
+          {"fill_pixels", options.fill_pixels},
           {"min_patch_pixels", options.min_patch_pixels},
           {"placement", static_cast<int>(options.placement)},
           {"fit", static_cast<int>(options.fit)}};

@@ -75,7 +75,7 @@ MeshRequest resolve(MeshFlags const& flags, std::vector<std::string> const& sett
   apply_settings(
       settings, "mesh",
       {number_setting("step_sigmas", options.step_sigmas), number_setting("max_angle_deg", options.max_angle_deg),
-       integer_setting("feather_px", options.feather_px),
+       integer_setting("feather_px", options.feather_px), integer_setting("fill_pixels", options.fill_pixels),
        integer_setting("min_patch_pixels", options.min_patch_pixels)});
   options.validate();
   return request;

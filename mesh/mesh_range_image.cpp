@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "mesh/depth_approximation.h"
 #include "mesh/feather.h"
+#include "mesh/hole_fill.h"
 #include "mesh/mesh_error.h"
 #include "mesh/outline.h"
 #include "mesh/surface_links.h"
@@ -87,6 +88,7 @@ void MeshOptions::validate() const {
   require(std::isfinite(step_sigmas) && step_sigmas > 0, "step_sigmas must be greater than 0");
   require(max_angle_deg > 0 && max_angle_deg <= 90, "max_angle_deg must be greater than 0 and at most 90");
   require(feather_px >= 1 && feather_px <= 65536, "feather_px must be between 1 and 65536");
+  require(fill_pixels >= 0, "fill_pixels must not be negative");
   require(min_patch_pixels >= 1, "min_patch_pixels must be at least 1");
 }
 
@@ -94,13 +96,15 @@ ViewMeshResult mesh_range_image(RangeImage const& whole, MeshOptions const& opti
                                 MeshMarks const& marks) {
   options.validate();
   whole.check();
-  RangeImage image = whole;
+  RangeImage chosen = whole;
   if (!marks.empty()) {
-    for (cv::Mat* plane : {static_cast<cv::Mat*>(&image.depth), static_cast<cv::Mat*>(&image.sigma),
-                           static_cast<cv::Mat*>(&image.classes)})
+    for (cv::Mat* plane : {static_cast<cv::Mat*>(&chosen.depth), static_cast<cv::Mat*>(&chosen.sigma),
+                           static_cast<cv::Mat*>(&chosen.classes)})
       *plane = plane->clone();
-    apply_polygons(marks, image);
+    apply_polygons(marks, chosen);
   }
+  RangeImage const image =
+      options.fill_pixels > 0 ? fill_small_holes(chosen, options.step_sigmas, options.fill_pixels) : chosen;
   ViewMeshResult result;
   result.view_mesh.camera = image.camera;
   SurfaceLinks links = find_surface_links(image, options.step_sigmas, options.min_patch_pixels);
@@ -116,7 +120,7 @@ ViewMeshResult mesh_range_image(RangeImage const& whole, MeshOptions const& opti
   mesh = approximation.triangulation.to_mesh(image.camera);
   keep_well_seen(image, options.max_angle_deg, mesh, result.view_mesh.cos_phi);
 
-  MeshError const error = measure_mesh(image, mesh);
+  MeshError const error = measure_mesh(chosen, mesh);
   result.figures = error.figures;
   result.view_mesh.feather = feather_weights(error.covered, links, options.feather_px);
   return result;

@@ -44,6 +44,7 @@ struct MeshOptions {
   /// grazing triangle count little: dropping it early would leave holes where no other view looks. 90: none is dropped.
   double max_angle_deg = 87.0;
   int feather_px = 16;       ///< distance from the boundary at which the feather weight is full
+  int fill_pixels = 9;       ///< holes in one surface of at most so many pixels without depth are bridged; 0: none
   int min_patch_pixels = 2;  ///< smaller groups of pixels on one surface are not meshed: they count as uncovered
   void validate() const;
 };

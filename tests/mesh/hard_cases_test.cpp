@@ -27,6 +27,7 @@ ViewMeshResult mesh(RangeImage const& image, MeshOptions options = {}) {
 MeshOptions everything() {
   MeshOptions options;
   options.min_patch_pixels = 1;
+  options.fill_pixels = 0;
   options.max_angle_deg = 89.99;
   return options;
 }
