@@ -12,8 +12,8 @@ namespace scanview {
 
 /// A triangulation over the picture whose vertices carry linear depth: what all ways to place vertices make and what
 /// the fit improves. Its border (the outline, and both sides of step edges, each with its own vertices) stays where it
-/// is. All changes keep every triangle's corners turning from x to y (exact predicates), so that no triangle can fold
-/// over another.
+/// is. All changes keep every triangle's corners turning from x to y, by more than rounding can undo, so that no
+/// triangle can fold over another; whether an edge is Delaunay is decided exactly (CGAL).
 class DepthTriangulation {
  public:
   struct Vertex {
