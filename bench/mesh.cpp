@@ -150,6 +150,25 @@ void run_peers(DepthMap const& map, int triangles, bool slow, Curves& curves) {
   }
 }
 
+/// Our time over meshoptimizer's to as many triangles, in turns, so that both meet the same machine.
+void compare_times(DepthMap const& map, MeshOptions const& options, int triangles) {
+  RangeImage const image = to_range_image(map, false);
+  TriangleMesh const grid = full_grid(to_range_image(map, true));
+  std::vector<double> ours, theirs;
+  constexpr int kTurns = 7;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    Context context;
+    auto start = std::chrono::steady_clock::now();
+    mesh_range_image(image, options, context);
+    ours.push_back(seconds_since(start));
+    start = std::chrono::steady_clock::now();
+    simplify_with_peer(MeshPeer::meshoptimizer, grid, triangles);
+    theirs.push_back(seconds_since(start));
+  }
+  fmt::print("  time / meshoptimizer's {:.3f} ({:.3f} s and {:.3f} s, medians of {} in turns, one thread)\n",
+             median(ours) / median(theirs), median(ours), median(theirs), kTurns);
+}
+
 void bench_map(DepthMap const& map, Settings const& settings, Curves& curves) {
   for (double const tolerance : settings.tolerances) {
     fmt::print("{} {} x {}, tolerance {}\n", map.name, map.height.cols, map.height.rows, tolerance);
@@ -168,13 +187,14 @@ void bench_map(DepthMap const& map, Settings const& settings, Curves& curves) {
     print(torn_many);
     Row const torn = note("scanview", run_ours(map, "scanview", options, false));
     for (auto const& [placement, name] : {std::pair(MeshOptions::Placement::probing, "scanview, probing"),
-                                         std::pair(MeshOptions::Placement::decimation, "scanview, decimation")}) {
+                                          std::pair(MeshOptions::Placement::decimation, "scanview, decimation")}) {
       if (placement == MeshOptions::Placement::decimation && !settings.slow && map.height.total() > 500000) continue;
       MeshOptions other = options;
       other.placement = placement;
       note(name, run_ours(map, name, other, false));
     }
     if (settings.peers) {
+      compare_times(map, options, int(torn.triangles));
       run_peers(map, int(torn.triangles), settings.slow, curves);
       if (map.height.total() < 500000) run_peers(map, int(insertion.triangles), settings.slow, curves);
     }

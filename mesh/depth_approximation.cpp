@@ -89,8 +89,11 @@ class Approximation {
     std::vector<TriangleError> errors = scan_errors(triangulation_, field_);
     if (is_full())
       for (TriangleError const& error : errors) limit = std::max(limit, double(error.worst));
-    errors = fit_depths(triangulation_, field_, limit, std::move(errors));
-    if (options_.fit != MeshOptions::Fit::joint) return;
+    // Insertion has fitted already what little it then added to.
+    bool const is_fitted = options_.placement == MeshOptions::Placement::insertion && !is_automatic();
+    if (options_.fit == MeshOptions::Fit::depths || !is_fitted)
+      errors = fit_depths(triangulation_, field_, limit, std::move(errors));
+    if (options_.fit == MeshOptions::Fit::depths) return;
     JointFitOptions joint;
     joint.limit = limit;
     joint.sweeps = kSweeps;

@@ -33,7 +33,8 @@ MeshError measure_mesh(RangeImage const& image, TriangleMesh const& mesh) {
   MeshError result;
   result.figures.triangles = mesh.triangles.size();
   result.covered = cv::Mat1b::zeros(camera.height(), camera.width());
-  std::vector<double> errors;
+  std::vector<float> errors;
+  errors.reserve(std::size_t(camera.width()) * camera.height());
   std::size_t object = 0;
   double squares = 0;
   for (int y = 0; y < camera.height(); ++y)
@@ -44,13 +45,13 @@ MeshError measure_mesh(RangeImage const& image, TriangleMesh const& mesh) {
       ++object;
       if (!covered) continue;
       double const error = std::abs(nearest(y, x) - image.depth(y, x));
-      errors.push_back(error);
+      errors.push_back(float(error));
+      result.figures.max = std::max(result.figures.max, error);
       squares += error * error;
     }
   if (object > 0) result.figures.uncovered = double(object - errors.size()) / double(object);
   if (errors.empty()) return result;
   result.figures.rms = std::sqrt(squares / double(errors.size()));
-  result.figures.max = *std::max_element(errors.begin(), errors.end());
   auto const at = errors.begin() + std::ptrdiff_t(0.95 * double(errors.size() - 1));
   std::nth_element(errors.begin(), at, errors.end());
   result.figures.p95 = *at;
