@@ -47,6 +47,7 @@ class Approximation {
     result.tolerance = is_automatic() ? kAutomaticSigmas : options_.tolerance;
     triangulation_ = triangulate_outline(image_, links_, outline_, tolerance_);
     place_vertices();
+    triangulation_.order_by_place();
     fit();
     constexpr int kRounds = 8;
     for (int round = 0; round < kRounds; ++round) {
@@ -67,6 +68,7 @@ class Approximation {
       case MeshOptions::Placement::insertion:
         if (options_.fit != MeshOptions::Fit::none && !is_automatic()) {
           insert_greedily(triangulation_, field_, maker, kCoarsely, most, context_);
+          triangulation_.order_by_place();
           fit_depths(triangulation_, field_, kWithin, scan_errors(triangulation_, field_));
         }
         insert_greedily(triangulation_, field_, maker, kWithin, most, context_);

@@ -3,6 +3,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <unordered_map>
@@ -54,6 +55,42 @@ void DepthTriangulation::connect() {
 
 int DepthTriangulation::count_vertices() const {
   return int(std::count_if(vertices_.begin(), vertices_.end(), [](Vertex const& v) { return v.triangle >= 0; }));
+}
+
+void DepthTriangulation::order_by_place() {
+  constexpr double kSquare = 64;  // pixels
+  struct Place {
+    int row, column, triangle;
+    auto operator<=>(Place const&) const = default;
+  };
+  std::vector<Place> order;
+  for (int t = 0; t < int(triangles_.size()); ++t) {
+    if (!alive(t)) continue;
+    DepthTriangle const s = shape(t);
+    Eigen::Vector2d const middle = (s.corner[0] + s.corner[1] + s.corner[2]) / (3 * kSquare);
+    order.push_back({int(std::floor(middle.y())), int(std::floor(middle.x())), t});
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<int> new_triangle(triangles_.size(), -1), new_vertex(vertices_.size(), -1);
+  for (std::size_t k = 0; k < order.size(); ++k) new_triangle[order[k].triangle] = int(k);
+  std::vector<Vertex> vertices;
+  std::vector<Triangle> triangles;
+  for (Place const& place : order) {
+    Triangle triangle = triangles_[place.triangle];
+    for (int i = 0; i < 3; ++i) {
+      int& vertex = new_vertex[triangle.vertex[i]];
+      if (vertex < 0) {
+        vertex = int(vertices.size());
+        vertices.push_back(vertices_[triangle.vertex[i]]);
+        vertices.back().triangle = new_triangle[vertices.back().triangle];
+      }
+      triangle.vertex[i] = vertex;
+      if (triangle.next[i] >= 0) triangle.next[i] = new_triangle[triangle.next[i]];
+    }
+    triangles.push_back(triangle);
+  }
+  vertices_ = std::move(vertices);
+  triangles_ = std::move(triangles);
 }
 
 DepthTriangle DepthTriangulation::shape(int t) const {

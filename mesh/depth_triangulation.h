@@ -42,6 +42,10 @@ class DepthTriangulation {
   int count_vertices() const;           ///< that are there
   void set_depth(int v, double depth) { vertices_[v].depth = depth; }
 
+  /// Leaves out what was removed and orders triangles and vertices by place, square after square of the picture, so
+  /// that whoever goes through them finds the pixels in the cache.
+  void order_by_place();
+
   DepthTriangle shape(int t) const;
   int corner_of(int t, int v) const;     ///< which corner of the triangle the vertex is
   int opposite_of(int t, int to) const;  ///< which edge of the triangle leads to triangle `to`
