@@ -2,6 +2,7 @@
 // rasteriser of the result against the input pixels.
 //   bench_mesh --data FOLDER [--peers] [--slow] [--plot FILE]   the bunny's first scan and a synthetic map with steps
 //   bench_mesh --set SET ...                                    the views of scan sets
+//   bench_mesh --auto                                           the automatic tolerance on synthetic views
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -16,6 +17,7 @@
 #include "bench/mesh_depth_maps.h"
 #include "bench/mesh_peers.h"
 #include "mesh/view_mesh.h"
+#include "synth/scanner.h"
 #include "tests/mesh/reference_raster.h"
 
 namespace scanview {
@@ -27,7 +29,7 @@ struct Settings {
   fs::path data, plot;
   std::vector<fs::path> sets;
   std::vector<double> tolerances = {1.0, 0.5};
-  bool peers = false, slow = false;
+  bool peers = false, slow = false, automatic = false;
 };
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -290,11 +292,59 @@ void bench_set(fs::path const& folder) {
   }
 }
 
+/// `--tolerance auto` against a sweep of tolerances, by the error to the true surface, on synthetic views with noise.
+void bench_automatic() {
+  for (std::string const& model : builtin_model_names())
+    for (double const noise : {5e-4, 2e-3, 8e-3}) {
+      SynthOptions options;
+      options.views = 4;
+      options.noise.depth_sigma = noise;
+      Context context;
+      SynthResult const synth = synthesize(builtin_model(model), options, context);
+      auto const measure = [&](MeshOptions const& mesh_options) {
+        double squares = 0, depths = 0, triangles = 0;
+        for (std::size_t v = 0; v < synth.set.views.size(); ++v) {
+          RangeImage const& image = synth.set.views[v].image;
+          TriangleMesh const mesh = mesh_range_image(image, mesh_options, context).view_mesh.mesh;
+          testing::ReferenceRaster const raster = testing::reference_raster(image, mesh);
+          RangeImage truth = image;
+          truth.depth = synth.true_depth[v];
+          testing::ReferenceRaster const errors = testing::reference_raster(truth, mesh);
+          for (int y = 0; y < image.depth.rows; ++y)
+            for (int x = 0; x < image.depth.cols; ++x) {
+              if (!image.has_depth(x, y) || raster.count(y, x) == 0) continue;
+              double const relative = errors.worst_error(y, x) / image.sigma(y, x);
+              squares += relative * relative;
+              ++depths;
+            }
+          triangles += double(mesh.triangles.size());
+        }
+        return std::pair(std::sqrt(squares / depths), triangles / double(synth.set.views.size()));
+      };
+      auto const [automatic, count] = measure({});
+      double best = INFINITY, best_at = 0, best_count = 0;
+      MeshOptions swept;
+      swept.tolerance_kind = MeshOptions::Tolerance::sigmas;
+      for (swept.tolerance = 1.5; swept.tolerance < 25; swept.tolerance *= 1.25)
+        if (auto const [error, triangles] = measure(swept); error < best) {
+          best = error;
+          best_at = swept.tolerance;
+          best_count = triangles;
+        }
+      fmt::print(
+          "{:10} noise {:.2g} of the radius: auto {:.3f} sigma from the truth, {:6.0f} triangles; best of the sweep "
+          "{:.3f} at {:.2f} sigma, {:6.0f} triangles\n",
+          model, noise, automatic, count, best, best_at, best_count);
+      std::cout.flush();
+    }
+}
+
 void bench(Settings const& settings) {
   MeshOptions const defaults;
   fmt::print("options: step_sigmas {}, max_angle_deg {}, min_patch_pixels {}, fit joint\n", defaults.step_sigmas,
              defaults.max_angle_deg, defaults.min_patch_pixels);
   for (fs::path const& set : settings.sets) bench_set(set);
+  if (settings.automatic) bench_automatic();
   if (settings.data.empty()) return;
   std::map<std::string, Curves> maps;
   for (DepthMap const& map : {bunny_depth_map(settings.data), synthetic_depth_map()})
@@ -313,6 +363,7 @@ int main(int argc, char** argv) {
   app.add_option("--tolerance", settings.tolerances, "Greatest errors, in units");
   app.add_option("--plot", settings.plot, "Page with error and time against triangles");
   app.add_flag("--peers", settings.peers, "CGAL's simplification, and meshoptimizer where it is installed");
+  app.add_flag("--auto", settings.automatic, "The automatic tolerance against a sweep, on synthetic views");
   app.add_flag("--slow", settings.slow, "Also the slow ones on the large map: minutes");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -196,6 +196,8 @@ TEST(Usage, MistakesExitWithTwo) {
                                                     {"import", "cuneiform", "/tmp", "-o", "/tmp/x"},
                                                     {"register", "set", "--init", "sideways"},
                                                     {"mesh", "set", "--tolerance", "3parsec"},
+                                                    {"mesh", "set", "--placement", "dice"},
+                                                    {"mesh", "set", "--levels", "0"},
                                                     {"run", "/tmp", "-o", "/tmp/x", "--set", "mesh.colour=1"}})
     EXPECT_EQ(run_scanview(arguments).exit_code, 2) << (arguments.empty() ? "" : arguments[0]);
   EXPECT_EQ(run_scanview({"--help"}).exit_code, 0);

@@ -97,6 +97,37 @@ TEST_F(Pipeline, ExportsComeBack) {
     EXPECT_TRUE(run({"info", in(name)}).contains("kind")) << name;
 }
 
+TEST_F(Pipeline, MeshesByTheirOptions) {
+  run({"synth", "statuette", "--pattern", "range", "-o", in("set"), "--views", "2", "--size", "160x120", "--noise",
+       "0.001"});
+  Json const automatic = run({"mesh", in("set"), "--levels", "3"});
+  Json const& view = automatic["views"][0];
+  ASSERT_EQ(view["levels"].size(), 2u);
+  EXPECT_LT(view["levels"][0]["triangles"], view["triangles"]);
+  EXPECT_LE(view["levels"][1]["triangles"], view["levels"][0]["triangles"]);
+  EXPECT_EQ(view["levels"][1]["tolerance"], 4 * automatic["tolerance"].get<double>());
+  for (char const* key : {"rms", "p95", "max", "uncovered"}) EXPECT_TRUE(view[key].is_number()) << key;
+  EXPECT_TRUE(fs::exists(in("set/views/000/mesh.2.ply")));
+  EXPECT_GT(read_json(in("set/scanset.json"))["error_budget"]["approximation"]["rms"].get<double>(), 0);
+
+  Json const few = run({"mesh", in("set"), "--triangles", "600", "--placement", "probing", "--fit", "depths"});
+  EXPECT_LE(few["views"][1]["triangles"], 600);
+  EXPECT_FALSE(fs::exists(in("set/views/000/mesh.1.ply"))) << "levels of an earlier run";
+
+  write_file(in("marks.json"), R"({"001": {"remove": [[[-1, -1], [200, -1], [200, 60], [-1, 60]]]}})");
+  Json const marked = run({"mesh", in("set"), "--marks", in("marks.json")});
+  EXPECT_EQ(marked["views"][0]["triangles"], view["triangles"]);
+  EXPECT_LT(marked["views"][1]["triangles"], 0.8 * automatic["views"][1]["triangles"].get<double>());
+  write_file(in("marks.json"), R"({"007": {}})");
+  CommandResult const unknown = run_scanview({"mesh", in("set"), "--marks", in("marks.json")});
+  EXPECT_EQ(unknown.exit_code, 3);
+  EXPECT_NE(unknown.errors.find("007"), std::string::npos);
+
+  run({"export", in("set"), "--to", "obj", "-o", in("obj")});
+  for (char const* name : {"000.obj", "000.mtl", "000.jpg", "001.obj"})
+    EXPECT_TRUE(fs::exists(fs::path(in("obj")) / name)) << name;
+}
+
 TEST_F(Pipeline, PosesComeBack) {
   run({"synth", "statuette", "--pattern", "range", "-o", in("set"), "--views", "12", "--size", "120x90"});
   run({"mesh", in("set")});
