@@ -59,14 +59,15 @@ class JointFit {
     std::vector<int> open;
     for (int t = 0; t < int(m_.triangles().size()); ++t)
       if (m_.alive(t)) open.push_back(t);
-    std::vector<char> waits(m_.triangles().size(), 1);
-    for (int round = 0; round < 3 && !open.empty(); ++round) {
+    constexpr int kRounds = 3;
+    std::vector<char> waits(m_.triangles().size(), 1);  // for its first turn, in which it tries the edge to us
+    for (int round = 0; round < kRounds && !open.empty(); ++round) {
       std::vector<int> changed;
       for (int const t : open) {
         waits[t] = 0;
         for (int i = 0; i < 3; ++i) {
           int const n = m_.triangle(t).next[i];
-          if (n < 0 || (n > t && waits[n] && round == 0) || !try_flip(t, i)) continue;
+          if (n < 0 || (round == 0 && waits[n]) || !try_flip(t, i)) continue;
           changed.push_back(t);
           changed.push_back(n);
           break;
@@ -307,16 +308,22 @@ class JointFit {
     return {height, height * height * pixels / 6};
   }
 
+  /// A triangle around v once v is joined with u.
+  DepthTriangle joined(int t, int v, int u) const {
+    DepthTriangle shape = m_.shape(t);
+    int const k = m_.corner_of(t, v);
+    shape.corner[k] = m_.vertex(u).position;
+    shape.depth[k] = m_.vertex(u).depth;
+    return shape;
+  }
+
   /// How far the surface moves at vertex v where it is joined with u.
   double change_of_join(int v, int u) const {
     Eigen::Vector2d const place = m_.vertex(v).position;
     double least_outside = INFINITY, change = INFINITY;
     for (int const t : around_) {
       if (m_.corner_of(t, u) < 3) continue;
-      DepthTriangle shape = m_.shape(t);
-      int const k = m_.corner_of(t, v);
-      shape.corner[k] = m_.vertex(u).position;
-      shape.depth[k] = m_.vertex(u).depth;
+      DepthTriangle const shape = joined(t, v, u);
       double outside = 0;  // of the triangle, as a weight of a corner
       for (int i = 0; i < 3; ++i)
         outside = std::max(outside, -shape.barycentric_slope(i).dot(place - shape.corner[(i + 1) % 3]));
@@ -346,10 +353,7 @@ class JointFit {
       bool good = true;
       for (int const t : around_) {
         if (m_.corner_of(t, u) < 3) continue;
-        DepthTriangle shape = m_.shape(t);
-        int const k = m_.corner_of(t, v);
-        shape.corner[k] = m_.vertex(u).position;
-        shape.depth[k] = m_.vertex(u).depth;
+        DepthTriangle const shape = joined(t, v, u);
         good = !is_sliver(before, shape);
         if (!good) break;
         TriangleError const error = scan_error(field_, shape);

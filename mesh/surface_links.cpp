@@ -70,26 +70,6 @@ class StepTest {
   double step_sigmas_;
 };
 
-/// Union-find over pixels, the smallest index being the root.
-class Patches {
- public:
-  explicit Patches(std::size_t count) : parent_(count) {
-    for (std::size_t i = 0; i < count; ++i) parent_[i] = int(i);
-  }
-  int root(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int a, int b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
-
 /// Whether the sides between the four pixels around the corner at (x − ½, y − ½) separate pixels.
 int cracks_at_corner(SurfaceLinks const& links, int x, int y) {
   auto crack = [&](int x0, int y0, int x1, int y1) {
@@ -120,22 +100,39 @@ void heal_single_cracks(SurfaceLinks& links) {
 }  // namespace
 
 void drop_small_patches(SurfaceLinks& links, int min_patch_pixels) {
-  int const width = links.object.cols, height = links.object.rows;
-  Patches patches(std::size_t(width) * height);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      if (links.right(y, x)) patches.join(y * width + x, y * width + x + 1);
-      if (links.down(y, x)) patches.join(y * width + x, (y + 1) * width + x);
-    }
-  std::vector<int> size(std::size_t(width) * height, 0);
-  for (int i = 0; i < width * height; ++i) ++size[patches.root(i)];
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (links.object(y, x) && size[patches.root(y * width + x)] < min_patch_pixels) {
+  enum : uchar { unknown, large, small };
+  cv::Mat1b known = cv::Mat1b::zeros(links.object.size());
+  std::vector<cv::Point> patch;
+  for (int y = 0; y < known.rows; ++y)
+    for (int x = 0; x < known.cols; ++x) {
+      if (!links.object(y, x) || known(y, x) != unknown) continue;
+      // From here until it is large enough or meets what is.
+      bool is_large = false;
+      patch = {{x, y}};
+      known(y, x) = small;
+      for (std::size_t i = 0; i < patch.size() && !is_large; ++i) {
+        is_large = patch.size() >= std::size_t(min_patch_pixels);
+        cv::Point const at = patch[i];
+        auto const reach = [&](cv::Point const& next) {
+          if (known(next) == large) is_large = true;
+          if (known(next) != unknown) return;
+          known(next) = small;
+          patch.push_back(next);
+        };
+        if (links.right(at)) reach({at.x + 1, at.y});
+        if (links.down(at)) reach({at.x, at.y + 1});
+        if (at.x > 0 && links.right(at.y, at.x - 1)) reach({at.x - 1, at.y});
+        if (at.y > 0 && links.down(at.y - 1, at.x)) reach({at.x, at.y - 1});
+      }
+      is_large = is_large || patch.size() >= std::size_t(min_patch_pixels);
+      for (cv::Point const& at : patch) {
+        known(at) = is_large ? large : small;
+        if (is_large) continue;
         // Its links lead only to pixels of the same patch, which go as well.
-        links.object(y, x) = links.right(y, x) = links.down(y, x) = 0;
+        links.object(at) = links.right(at) = links.down(at) = 0;
         ++links.dropped;
       }
+    }
 }
 
 SurfaceLinks find_surface_links(RangeImage const& image, double step_sigmas, int min_patch_pixels) {
