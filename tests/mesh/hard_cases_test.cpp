@@ -168,6 +168,23 @@ TEST(HardCases, HugeSigmasInPlaces) {
   mesh(image, everything());
 }
 
+TEST(HardCases, SigmasNearZeroInPlaces) {
+  // Zero itself is refused where an image is made; below what single precision can tell nothing can be within.
+  Camera const camera = small_camera(48, 40);
+  RangeImage image = depth_map(camera, 1e-3, [&](int x, int y) { return 2 + 0.01 * std::sin(0.3 * x) * std::cos(y); });
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 48; ++x)
+      if (x > 10 && x < 30 && y % 5 < 2) image.sigma(y, x) = y % 2 ? 1e-30f : 1e-12f;
+  Context context;
+  MeshOptions options = everything();
+  options.max_angle_deg = 90;  // what follows every last digit is steep
+  ViewMeshResult const result = mesh_range_image(image, options, context);
+  EXPECT_NO_THROW(result.view_mesh.check());
+  EXPECT_EQ(reference_raster(image, result.view_mesh.mesh).uncovered, 0u);
+  image.sigma(7, 7) = 0;
+  EXPECT_THROW(mesh_range_image(image, {}, context), std::logic_error);
+}
+
 TEST(HardCases, ManyCocircularPoints) {
   // Equal bumps on a regular grid put equal vertices on regular places.
   RangeImage const image =
