@@ -37,7 +37,8 @@ Choice choose(Names<Choice> const& names, std::string const& word) {
 
 void add_mesh_flags(CLI::App& verb, MeshFlags& flags) {
   verb.add_option("--tolerance", flags.tolerance, "Greatest depth error: T (units), Tsigma, or auto");
-  verb.add_option("--triangles", flags.triangles, "At most so many a view (0: as many as the tolerance needs)");
+  verb.add_option("--triangles", flags.triangles,
+                  "So many a view, as far as they do more than model noise (0: as many as the tolerance needs)");
   verb.add_option("--levels", flags.levels, "Also coarser meshes, each of twice the tolerance: so many in all")
       ->check(CLI::Range(1, 16));
   verb.add_option("--placement", flags.placement,

@@ -75,7 +75,7 @@ DepthField make_depth_field(RangeImage const& image, SurfaceLinks const& links, 
       if (!object[x]) continue;
       double const d = depths[x], t = tolerances[x];
       field.depth(y, x) = float(perspective ? 1 / d : d);
-      field.weight(y, x) = float(std::min(perspective ? d * ((d + t) / t) : 1 / t, kGreatestWeight));
+      field.weight(y, x) = float(std::min(perspective ? d * (d / t) + d : 1 / t, kGreatestWeight));
     }
   }
   return field;

@@ -64,12 +64,11 @@ struct ViewMeshResult {
 
 /// Meshes one range image. The outline of what has depth and the step edges become polylines between the pixels, within
 /// half a pixel of their sides (outline.h, surface_links.h): constraints of a Delaunay triangulation (CGAL), each side
-/// with its own vertices, so that no triangle spans a step and a mesh covers exactly the object's pixels. Vertices are
-/// placed and fitted inside (depth_approximation.h); the tolerance holds on the single precision vertices. Patches of
-/// fewer than min_patch_pixels and grazing triangles are left out: `uncovered` counts their pixels. The normal
-/// (b − a) × (c − a) of a triangle points towards the camera. An image with too few depths for a triangle gives an
-/// empty mesh. About n log n; one thread.
-/// `marks` restrict and cut it by hand (mesh_marks.h).
+/// with its own vertices, so that no triangle spans a step and a mesh covers exactly the object's pixels and small
+/// holes between them. Vertices are placed and fitted inside (depth_approximation.h); the tolerance holds on the single
+/// precision vertices. Patches of fewer than min_patch_pixels and grazing triangles are left out: `uncovered` counts
+/// their pixels. The normal (b − a) × (c − a) of a triangle points towards the camera. An image with too few depths for
+/// a triangle gives an empty mesh. About n log n; one thread. `marks` restrict and cut it by hand (mesh_marks.h).
 ViewMeshResult mesh_range_image(RangeImage const& image, MeshOptions const& options, Context& context,
                                 MeshMarks const& marks = {});
 
