@@ -40,40 +40,39 @@ cv::Mat1b open_places(cv::Mat1b const& covered, SurfaceLinks const& links) {
 
 /// In each row of pixel centres the distance to the nearest closed place above or below, in half pixels, `most` at
 /// most.
-cv::Mat1w distances_along_columns(cv::Mat1b const& open, int most) {
-  cv::Mat1w result(open.rows / 2, open.cols);
-  std::vector<ushort> distance(open.cols, ushort(most));
+template <typename Distance>
+cv::Mat_<Distance> distances_along_columns(cv::Mat1b const& open, int most) {
+  cv::Mat_<Distance> result(open.rows / 2, open.cols);
+  std::vector<Distance> distance(open.cols, Distance(most));
   auto const step = [&](int row) {
     uchar const* const places = open[row];
     for (int x = 0; x < open.cols; ++x) {
-      ushort const farther = ushort(std::min(distance[x] + 1, most));
-      distance[x] = places[x] ? farther : ushort(0);
+      Distance const farther = Distance(distance[x] + (distance[x] < most));
+      distance[x] = places[x] ? farther : Distance(0);
     }
   };
   for (int row = 0; row < open.rows; ++row) {
     step(row);
     if (row % 2 == 1) std::copy(distance.begin(), distance.end(), result[row / 2]);
   }
-  std::fill(distance.begin(), distance.end(), ushort(most));
+  std::fill(distance.begin(), distance.end(), Distance(most));
   for (int row = open.rows - 1; row >= 0; --row) {
     step(row);
     if (row % 2 == 0) continue;
-    ushort* const known = result[row / 2];
+    Distance* const known = result[row / 2];
     for (int x = 0; x < open.cols; ++x) known[x] = std::min(known[x], distance[x]);
   }
   return result;
 }
 
-}  // namespace
-
-cv::Mat1b feather_weights(cv::Mat1b const& covered, SurfaceLinks const& links, int feather_px) {
-  // Exact Euclidean distances up to the one that counts: along columns first, then the nearest of all columns within
-  // reach (Saito and Toriwaki 1994).
-  int const most = std::min(2 * feather_px + 1, 65535);
-  cv::Mat1w const along = distances_along_columns(open_places(covered, links), most);
+/// Exact Euclidean distances up to the one that counts: along columns first, then the nearest of all columns within
+/// reach (Saito and Toriwaki 1994). `Distance` holds `most`.
+template <typename Distance>
+cv::Mat1b weights(cv::Mat1b const& covered, SurfaceLinks const& links, int feather_px, int most) {
+  cv::Mat_<Distance> const along = distances_along_columns<Distance>(open_places(covered, links), most);
   cv::Mat1b feather = cv::Mat1b::zeros(covered.size());
   for (int y = 0; y < covered.rows; ++y) {
-    ushort const* const column = along[y];
+    Distance const* const column = along[y];
     int next = 0;  // the first column from x on whose closed places are within reach
     for (int x = 0; x < covered.cols; ++x) {
       if (!covered(y, x)) continue;
@@ -94,6 +93,14 @@ cv::Mat1b feather_weights(cv::Mat1b const& covered, SurfaceLinks const& links, i
     }
   }
   return feather;
+}
+
+}  // namespace
+
+cv::Mat1b feather_weights(cv::Mat1b const& covered, SurfaceLinks const& links, int feather_px) {
+  int const most = std::min(2 * feather_px + 1, 65535);
+  return most <= 255 ? weights<uchar>(covered, links, feather_px, most)
+                     : weights<ushort>(covered, links, feather_px, most);
 }
 
 }  // namespace scanview

@@ -10,15 +10,14 @@ namespace {
 
 class StepTest {
  public:
-  StepTest(RangeImage const& image, double step_sigmas) : image_(image), step_sigmas_(step_sigmas) {}
+  StepTest(RangeImage const& image, double step_sigmas)
+      : image_(image), step_sigmas_(step_sigmas), pixel_(1.0 / std::max(image.camera.fx(), image.camera.fy())) {}
 
   /// Pixel (x, y) and the next one in direction (dx, dy), both with depths.
   bool is_step(int x, int y, int dx, int dy) const {
     double const za = image_.depth(y, x), zb = image_.depth(y + dy, x + dx);
     double const jump = std::abs(zb - za);
-    Camera const& camera = image_.camera;
-    double const width = camera.is_perspective() ? std::min(za, zb) / std::max(camera.fx(), camera.fy())
-                                                 : 1.0 / std::max(camera.fx(), camera.fy());
+    double const width = image_.camera.is_perspective() ? std::min(za, zb) * pixel_ : pixel_;
     if (jump <= width) return false;  // whatever the noise: most pixels
     double const sigma = std::hypot(double(image_.sigma(y, x)), double(image_.sigma(y + dy, x + dx)));
     double const noise = step_sigmas_ * sigma;
@@ -68,6 +67,7 @@ class StepTest {
 
   RangeImage const& image_;
   double step_sigmas_;
+  double pixel_;  ///< its width; under perspective, at depth 1
 };
 
 /// Whether the sides between the four pixels around the corner at (x − ½, y − ½) separate pixels.
