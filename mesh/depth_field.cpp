@@ -1,5 +1,6 @@
 #include "mesh/depth_field.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "mesh/pixel_spans.h"

@@ -193,6 +193,29 @@ TEST(HardCases, ManyCocircularPoints) {
   EXPECT_EQ(mesh(image).figures.uncovered, 0);
 }
 
+TEST(HardCases, AMillionCocircularGridPoints) {
+  RangeImage const image = depth_map(small_orthographic(1024, 1024), 1e-5,
+                                     [](int x, int y) { return 2 + (x % 16 == 0 && y % 16 == 0 ? 0.001 : 0.0); });
+  Context context;
+  ViewMeshResult const result = mesh_range_image(image, {}, context);
+  EXPECT_EQ(result.figures.uncovered, 0);
+  EXPECT_LE(result.figures.max, result.tolerance * 1e-5);
+}
+
+TEST(HardCases, TwelveMegapixels) {
+  Camera const camera = Camera::perspective(4000, 3000, 4000, 4000, 1999.5, 1499.5);
+  RangeImage const image =
+      depth_map(camera, 1e-3, [](int x, int y) { return 3 + 0.1 * std::sin(0.004 * x) * std::cos(0.005 * y); });
+  MeshOptions options;
+  options.tolerance_kind = MeshOptions::Tolerance::units;
+  options.tolerance = 0.002;
+  Context context;
+  ViewMeshResult const result = mesh_range_image(image, options, context);
+  EXPECT_EQ(result.figures.uncovered, 0);
+  EXPECT_LE(result.figures.max, options.tolerance);
+  EXPECT_LT(result.figures.triangles, 5000u) << "as many as the surface needs, however many pixels show it";
+}
+
 TEST(HardCases, AStepThatEndsInsideTheSurface) {
   // A slit: left and right of it the ground parts, more and more towards the top.
   RangeImage const image = depth_map(small_camera(), 1e-4, [](int x, int y) {

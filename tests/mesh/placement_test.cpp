@@ -121,6 +121,7 @@ TEST(Silhouette, IsWithinHalfAPixelOfTheTrueOutline) {
       length += (b - a).norm();
     }
     EXPECT_NEAR(length, 2 * std::numbers::pi * radius_px, 0.02 * length);
+    RecordProperty(perspective ? "perspective_px" : "orthographic_px", std::to_string(std::sqrt(squares / length)));
     EXPECT_LE(std::sqrt(squares / length), 0.5);
   }
 }
