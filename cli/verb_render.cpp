@@ -49,7 +49,7 @@ void render(RenderArguments const& arguments, Session& session) {
   auto const path = cameras(arguments, set);
   auto const gl = make_offscreen_context();
   auto const renderer =
-      make_view_based_renderer(*gl, set, read_view_meshes(arguments.set, set, context), arguments.options);
+      make_gl_renderer(*gl, std::make_shared<ViewLibrary>(set, read_view_meshes(arguments.set, set, context)), arguments.options);
   SupersamplingRenderer smooth(*renderer, arguments.supersampling);
   std::error_code error;
   fs::create_directories(arguments.output, error);

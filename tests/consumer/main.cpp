@@ -20,7 +20,7 @@ int main() {
   std::vector<ViewMesh> meshes;
   for (auto const& view : set.views) meshes.push_back(mesh_range_image(view.image, {}, context).view_mesh);
   auto const gl = make_offscreen_context();
-  auto const renderer = make_view_based_renderer(*gl, set, meshes);
+  auto const renderer = make_cpu_renderer(std::make_shared<scanview::ViewLibrary>(set, meshes));
   Frame const frame = renderer->render(set.views[0].image.camera, *set.views[0].object_from_camera);
   int drawn = 0;
   for (int y = 0; y < frame.color.rows; ++y)

@@ -80,7 +80,7 @@ TEST(ProjectiveTexture, AChartOnASlantedPlaneIsExactFromItsCameraAndFromAside) {
   // The mesher, not the pixels' grid, so that the triangles are large and what is wrong with (s, t) shows.
   ASSERT_LT(scene.meshes[0].mesh.triangles.size(), 100u);
   auto const gl = make_offscreen_context();
-  auto const renderer = make_view_based_renderer(*gl, scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(*gl, std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   for (double const aside : {0.0, 40.0}) {
     SCOPED_TRACE(aside);
     Isometry3d const pose =

@@ -49,12 +49,12 @@ double psnr_to_truth(Frame const& frame, Surface const& surface, Camera const& c
 }
 
 Frame draw(Scene const& scene, Camera const& camera, Isometry3d const& pose, ViewBasedOptions const& options = {}) {
-  return make_view_based_renderer(context(), scene.set, scene.meshes, options)->render(camera, pose);
+  return make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes), options)->render(camera, pose);
 }
 
 TEST(ViewBasedRenderer, ReproducesThePhotographAtASourceCamera) {
   auto const scene = ball({around(0, 10), around(120, 0), around(240, -10), around(10, 80)});
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     View const& view = scene.set.views[i];
     ViewMesh const& mesh = scene.meshes[i];
@@ -116,7 +116,7 @@ TEST(ViewBasedRenderer, NewSidesAgreeWithARayCaster) {
   std::vector<Isometry3d> poses;
   for (int i = 0; i < 8; ++i) poses.push_back(around(45 * i, i % 2 == 0 ? 30 : -20));
   auto const scene = ball(poses, Camera::perspective(320, 240, 300, 300, 160, 120));
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   Camera const perspective = Camera::perspective(200, 150, 190, 180, 90, 80);
   Camera const orthographic = Camera::orthographic(200, 150, 0.015, 0.016, 95, 70);
   for (auto const& camera : {perspective, orthographic}) {
@@ -130,7 +130,7 @@ TEST(ViewBasedRenderer, NewSidesAgreeWithARayCaster) {
 
 TEST(ViewBasedRenderer, ACroppedCameraDrawsTheCrop) {
   auto const scene = ball({around(0, 0), around(50, 20)});
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   for (auto const& camera : {small_camera(), Camera::orthographic(160, 120, 0.02, 0.02, 81, 64)}) {
     auto const whole = renderer->render(camera, around(20, 5));
     auto const part = renderer->render(camera.cropped(45, 22, 50, 61), around(20, 5));
@@ -149,7 +149,7 @@ TEST(ViewBasedRenderer, ACroppedCameraDrawsTheCrop) {
 
 TEST(ViewBasedRenderer, NeverShowsTheBackgroundOfAPhotograph) {
   auto const scene = ball({around(0, 0), around(60, 0), around(30, 50)});
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   // From near (magnified) and far (mipmaps). The background is magenta; no colour of paint() comes near to it, whose
   // green is at least 89 in 8-bit sRGB (0.1 linear) less rounding.
   for (double const distance : {2.0, 4.0, 20.0}) {
@@ -170,7 +170,7 @@ TEST(ViewBasedRenderer, FewViewsAndCirclesGiveDefinedPictures) {
   for (int i = 0; i < 8; ++i) sets.back().push_back(around(45 * i, 32));
   for (auto const& poses : sets) {
     auto const scene = ball(poses);
-    auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+    auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
     for (double const elevation : {-90.0, -40.0, 0.0, 60.0, 90.0}) {
       auto const pose = look_at(around(20, elevation).translation(), Vector3d::Zero(), Vector3d(0.1, 1, 0.2));
       auto const frame = renderer->render(small_camera(), pose);
@@ -186,7 +186,7 @@ TEST(ViewBasedRenderer, FrontAndBackOfAThinSheetDoNotBlend) {
   Vector3d const red(1, 0, 0), blue(0, 0, 1);
   auto const surface = together({sheet(0.005, 0.8, 1, red), sheet(-0.005, 0.8, -1, blue)});
   auto const scene = scan(surface, small_camera(), {around(0, 0), around(180, 0)}, 0.3, 0.1);
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   for (double const azimuth : {20.0, 60.0, 84.0, 96.0, 120.0, 160.0}) {
     auto const frame = renderer->render(small_camera(), around(azimuth, 0));
     EXPECT_GT(drawn_pixels(frame.color), 100U);
@@ -319,7 +319,7 @@ TEST(ViewBasedRenderer, MovingTheEyeALittleChangesThePictureALittle) {
   for (int i = 0; i < 6; ++i) poses.push_back(around(60 * i, 25));
   poses.push_back(around(10, -60));
   auto const scene = ball(poses);
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   // Over a whole turn and over the pole. A step of 0.02 degrees moves the ball's surface by 0.02 pixels, whose colours
   // change by at most about 25 of 255 a pixel: below 1 a step, plus 1 of rounding. A view that pops would change a
   // region.
@@ -346,14 +346,14 @@ TEST(ViewBasedRenderer, ViewsWithoutTrianglesAreLeftOut) {
   auto scene = ball({around(0, 0), around(60, 0), around(30, 40)});
   scene.meshes[2].mesh = {};
   scene.meshes[2].cos_phi.clear();
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   for (auto const& weight : renderer->view_weights(small_camera(), around(30, 40))) EXPECT_NE(weight.view, 2U);
   EXPECT_GT(drawn_pixels(renderer->render(small_camera(), around(30, 30)).color), 2000U);
 }
 
 TEST(ViewBasedRenderer, ExcludedViewsAreNotUsed) {
   auto const scene = ball({around(0, 0), around(60, 0), around(30, 40)});
-  auto const renderer = make_view_based_renderer(context(), scene.set, scene.meshes);
+  auto const renderer = make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   EXPECT_NEAR(renderer->view_weights(small_camera(), around(0, 0))[0].weight, 1, 0.01);
   renderer->exclude({0});
   for (auto const& weight : renderer->view_weights(small_camera(), around(0, 0))) EXPECT_NE(weight.view, 0U);
@@ -392,7 +392,7 @@ TEST(GlContext, OsMesaAndSurfacelessEglDrawTheSame) {
   }
   Frame frame;
   {
-    auto const renderer = make_view_based_renderer(*egl, scene.set, scene.meshes);
+    auto const renderer = make_gl_renderer(*egl, std::make_shared<ViewLibrary>(scene.set, scene.meshes));
     // Both in turn: each binds itself.
     draw(scene, small_camera(), around(20, 10));
     frame = renderer->render(small_camera(), around(20, 10));

@@ -1,5 +1,7 @@
 #include "viewer/blend/soft_z_compositor.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 
@@ -18,13 +20,15 @@ void main() {
 )";
 
 // Colour goes out as B, G, R, A: the order of the picture in memory.
-constexpr char kFragmentShader[] = R"(#version 330 core
-const int MAX_LAYERS = 24;
+constexpr char kFragmentShader[] = R"(
 uniform sampler2DArray color_layers;
 uniform sampler2DArray depth_layers;
 uniform int layer_count;
 uniform float layer_weight[MAX_LAYERS];
 uniform float layer_fill[MAX_LAYERS];
+uniform vec3 layer_hue[MAX_LAYERS];
+uniform int show;                  // SoftZ::Show
+uniform bool nearest;
 uniform float threshold;
 uniform float ramp;               // 1 / (half a threshold)
 uniform float reliability_ratio;
@@ -51,15 +55,15 @@ void main() {
     if (q > 0.0) {
       quality[count] = q;
       layer[count++] = i;
-      good += layer_weight[i] * min(1.0, 0.35 + q / 0.1);
+      good += layer_weight[i] * min(1.0, GOOD_AT_ZERO + q / GOOD_QUALITY);
     }
   }
-  float need = clamp(1.0 - good / 0.3, 0.0, 1.0);
+  float need = clamp(1.0 - good / GOOD_ENOUGH, 0.0, 1.0);
   int kept = 0;
   for (int k = 0; k < count; ++k) {
     int i = layer[k];
     // What only fills must be fairly good itself: the last fringe of a mesh, seen grazingly, hangs from the true outline.
-    float fair = clamp(quality[k] / 0.03 - 1.0, 0.0, 1.0);
+    float fair = clamp(quality[k] / FAIR_QUALITY - 1.0, 0.0, 1.0);
     float weight = (layer_weight[i] + need * fair * layer_fill[i]) * quality[k];
     if (weight > 0.0) {
       w[kept] = weight;
@@ -79,11 +83,26 @@ void main() {
   }
   vec4 sum = vec4(0.0);
   float depth = 0.0;
+  float greatest = 0.0;
   for (int k = 0; k < count; ++k) {
     float hidden = 0.0;
     for (int i = 0; i < count; ++i) hidden = max(hidden, reliable[i] * hide(z[k] - z[i]));
     float weight = w[k] * reliable[k] * (1.0 - hidden);
-    sum += weight * vec4(texelFetch(color_layers, ivec3(pixel, layer[k]), 0).rgb, 1.0);
+    if (nearest) {
+      weight = 1.0;
+      for (int i = 0; i < count; ++i) {
+        if (z[i] < z[k] || (z[i] == z[k] && i < k)) weight = 0.0;
+      }
+    }
+    vec3 color = texelFetch(color_layers, ivec3(pixel, layer[k]), 0).rgb;
+    if (show != 0) color = layer_hue[layer[k]];
+    if (show == 2) {
+      if (weight <= greatest) continue;
+      greatest = weight;
+      sum = vec4(0.0);
+      depth = 0.0;
+    }
+    sum += weight * vec4(color, 1.0);
     depth += weight * z[k];
   }
   if (sum.a > 0.0) {
@@ -97,10 +116,18 @@ void main() {
 }
 )";
 
+std::string fragment_shader() {
+  return fmt::format(
+             "#version 330 core\nconst int MAX_LAYERS = {};\nconst float GOOD_AT_ZERO = {};\n"
+             "const float GOOD_QUALITY = {};\nconst float GOOD_ENOUGH = {};\nconst float FAIR_QUALITY = {};\n",
+             SoftZ::kMaxLayers, SoftZ::kGoodAtZero, SoftZ::kGoodQuality, SoftZ::kGoodEnough, SoftZ::kFairQuality) +
+         kFragmentShader;
+}
+
 }  // namespace
 
 SoftZCompositor::SoftZCompositor(GlFunctions const& gl)
-    : gl_(gl), program_(gl, kVertexShader, kFragmentShader), no_vertices_(gl), framebuffer_(gl) {}
+    : gl_(gl), program_(gl, kVertexShader, fragment_shader()), no_vertices_(gl), framebuffer_(gl) {}
 
 void SoftZCompositor::resize(int width, int height) {
   if (width == width_ && height == height_) return;
@@ -126,8 +153,9 @@ void SoftZCompositor::resize(int width, int height) {
   height_ = height;
 }
 
-Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<LayerWeight> const& weights, double threshold,
-                               double reliability_ratio) {
+Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<LayerWeight> const& weights,
+                               SoftZ const& soft_z) {
+  constexpr int kMaxLayers = SoftZ::kMaxLayers;
   if (weights.size() > static_cast<std::size_t>(kMaxLayers)) {
     throw std::logic_error("SoftZCompositor: too many layers");
   }
@@ -145,19 +173,24 @@ Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<LayerWeig
   gl_.Uniform1i(program_.uniform("depth_layers"), 1);
   gl_.Uniform1i(program_.uniform("layer_count"), static_cast<GLint>(weights.size()));
   std::vector<float> weight(kMaxLayers, 0.0F), fill(kMaxLayers, 0.0F);
+  std::vector<Eigen::Vector3f> hue(kMaxLayers, Eigen::Vector3f::Zero());
   for (std::size_t i = 0; i < weights.size(); ++i) {
     weight[i] = static_cast<float>(weights[i].weight);
     fill[i] = static_cast<float>(weights[i].fill);
+    hue[i] = weights[i].hue;
   }
   gl_.Uniform1fv(program_.uniform("layer_weight"), kMaxLayers, weight.data());
   gl_.Uniform1fv(program_.uniform("layer_fill"), kMaxLayers, fill.data());
+  gl_.Uniform3fv(program_.uniform("layer_hue"), kMaxLayers, hue.front().data());
+  gl_.Uniform1i(program_.uniform("show"), static_cast<GLint>(soft_z.show));
+  gl_.Uniform1i(program_.uniform("nearest"), soft_z.nearest ? 1 : 0);
   // Infinite and zero thresholds stay finite in the shader's arithmetic and mean the same.
   constexpr double kLargest = 1e30, kSteepest = 1e30;
-  threshold = std::min(threshold, kLargest);
+  double const threshold = std::min(soft_z.threshold, kLargest);
   gl_.Uniform1f(program_.uniform("threshold"), static_cast<float>(threshold));
   gl_.Uniform1f(program_.uniform("ramp"),
                 static_cast<float>(threshold > 0 ? std::min(2 / threshold, kSteepest) : kSteepest));
-  gl_.Uniform1f(program_.uniform("reliability_ratio"), static_cast<float>(reliability_ratio));
+  gl_.Uniform1f(program_.uniform("reliability_ratio"), static_cast<float>(soft_z.reliability_ratio));
   gl_.BindVertexArray(no_vertices_.name());
   gl_.DrawArrays(GL_TRIANGLES, 0, 3);
 

@@ -39,7 +39,7 @@ std::vector<ViewFigures> evaluate(GlContext& gl, ScanSet const& set, std::vector
   for (std::size_t const view : views) {
     if (view >= set.views.size()) throw Error(ErrorCode::usage, {}, "there is no view " + std::to_string(view));
   }
-  auto const renderer = make_view_based_renderer(gl, set, meshes, options);
+  auto const renderer = make_gl_renderer(gl, std::make_shared<ViewLibrary>(set, meshes), options);
   std::vector<ViewFigures> result;
   for (std::size_t const view : views) {
     context.check_cancelled();

@@ -16,6 +16,7 @@ namespace scanview {
   X(GLFRONTFACE, FrontFace)                             \
   X(GLDEPTHFUNC, DepthFunc)                             \
   X(GLVIEWPORT, Viewport)                               \
+  X(GLPOLYGONMODE, PolygonMode)                         \
   X(GLCLEARBUFFERFV, ClearBufferfv)                     \
   X(GLPIXELSTOREI, PixelStorei)                         \
   X(GLREADPIXELS, ReadPixels)                           \
@@ -66,6 +67,7 @@ namespace scanview {
   X(GLUNIFORM1FV, Uniform1fv)                           \
   X(GLUNIFORM2F, Uniform2f)                             \
   X(GLUNIFORM3F, Uniform3f)                             \
+  X(GLUNIFORM3FV, Uniform3fv)                           \
   X(GLUNIFORMMATRIX4FV, UniformMatrix4fv)
 
 /// Our own loader: epoxy and GLEW do not work on OSMesa. One object a context; plain function pointers.

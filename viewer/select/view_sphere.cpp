@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <string>
 
@@ -85,6 +86,7 @@ ViewSphere::ViewSphere(std::vector<Vector3d> const& directions) {
   }
   fill_caps();
   mix_for_virtual_corners();
+  link_faces();
   for (auto const& face : faces_) {
     if (face.maxCoeff() >= static_cast<int>(views_at_.size())) continue;
     Vector3i triangle;
@@ -157,32 +159,67 @@ void ViewSphere::mix_for_virtual_corners() {
   }
 }
 
-std::vector<ViewWeight> ViewSphere::weights(Vector3d const& direction) const {
+void ViewSphere::link_faces() {
+  std::map<std::pair<int, int>, int> face_of_edge;  // directed
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    for (int k = 0; k < 3; ++k) face_of_edge[{faces_[f][k], faces_[f][(k + 1) % 3]}] = static_cast<int>(f);
+  }
+  for (auto const& face : faces_) {
+    Vector3i across;
+    for (int k = 0; k < 3; ++k) across[k] = face_of_edge.at({face[(k + 2) % 3], face[(k + 1) % 3]});
+    across_.push_back(across);
+  }
+}
+
+/// Barycentric coordinates where the ray meets the face's plane; all negative where that is behind the eye's back.
+Vector3d ViewSphere::share_of(Vector3d const& eye, std::size_t face) const {
+  Vector3d const& a = corners_[static_cast<std::size_t>(faces_[face][0])];
+  Vector3d const& b = corners_[static_cast<std::size_t>(faces_[face][1])];
+  Vector3d const& c = corners_[static_cast<std::size_t>(faces_[face][2])];
+  Vector3d const share(eye.dot(b.cross(c)), eye.dot(c.cross(a)), eye.dot(a.cross(b)));
+  double const sum = share.sum();
+  return sum > 0 ? Vector3d(share / sum) : Vector3d::Constant(-std::numeric_limits<double>::infinity());
+}
+
+/// The face the ray leaves through.
+std::size_t ViewSphere::locate(Vector3d const& eye, std::size_t face) const {
+  if (face >= faces_.size()) face = 0;
+  // A Delaunay triangulation is walked without cycles, towards the side of the worst edge; the bound is for rounding.
+  for (std::size_t step = 0; step < faces_.size(); ++step) {
+    Vector3d const& a = corners_[static_cast<std::size_t>(faces_[face][0])];
+    Vector3d const& b = corners_[static_cast<std::size_t>(faces_[face][1])];
+    Vector3d const& c = corners_[static_cast<std::size_t>(faces_[face][2])];
+    Vector3d const sides(eye.dot(b.cross(c)), eye.dot(c.cross(a)), eye.dot(a.cross(b)));
+    int worst = 0;
+    // On an edge, nearly, the scan below decides, so that the same face is found from wherever the walk began.
+    constexpr double kOnEdge = 1e-12;
+    double const least = sides.minCoeff(&worst);
+    if (least > kOnEdge) return face;
+    if (least > -kOnEdge) break;
+    face = static_cast<std::size_t>(across_[face][worst]);
+  }
+  // The one where the least barycentric coordinate is greatest, which is right on edges and under rounding too.
+  std::size_t best = 0;
+  double best_least = -std::numeric_limits<double>::infinity();
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    double const least = share_of(eye, f).minCoeff();
+    if (least > best_least) {
+      best_least = least;
+      best = f;
+    }
+  }
+  return best;
+}
+
+std::vector<ViewWeight> ViewSphere::weights(Vector3d const& direction, std::size_t& face) const {
   double const length = direction.stableNorm();
   if (!std::isfinite(length) || length == 0) {
     throw Error(ErrorCode::bad_input, {}, "view sphere: the eye has no direction");
   }
   Vector3d const eye = (direction / length).normalized();
-
-  // The face the ray leaves through: the one where its least barycentric coordinate is greatest, which is right on
-  // edges and under rounding too.
-  Vector3d best_share(1, 0, 0);
-  Vector3i best_face = faces_.front();
-  double best = -std::numeric_limits<double>::infinity();
-  for (auto const& face : faces_) {
-    Vector3d const& a = corners_[static_cast<std::size_t>(face[0])];
-    Vector3d const& b = corners_[static_cast<std::size_t>(face[1])];
-    Vector3d const& c = corners_[static_cast<std::size_t>(face[2])];
-    Vector3d const share(eye.dot(b.cross(c)), eye.dot(c.cross(a)), eye.dot(a.cross(b)));
-    double const sum = share.sum();
-    if (!(sum > 0)) continue;
-    double const least = share.minCoeff() / sum;
-    if (least > best) {
-      best = least;
-      best_share = share / sum;
-      best_face = face;
-    }
-  }
+  face = locate(eye, face);
+  Vector3i const best_face = faces_[face];
+  Vector3d best_share = share_of(eye, face);
   best_share = best_share.cwiseMax(0.0);
   best_share /= best_share.sum();
 

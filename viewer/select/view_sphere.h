@@ -29,8 +29,14 @@ class ViewSphere {
   /// Directions need not be unit; zero or non-finite ones throw Error{bad_input}. At least one.
   explicit ViewSphere(std::vector<Eigen::Vector3d> const& directions);
   /// Ordered by view. Two or three views where they surround the eye (more only where directions coincide), up to seven
-  /// near the middle of an empty cap. Linear in the number of views.
-  std::vector<ViewWeight> weights(Eigen::Vector3d const& direction) const;
+  /// near the middle of an empty cap. `face`, where given, is a place to keep the face between calls: location walks
+  /// from it, a few faces for an eye that moved a little, about the square root of their number from anywhere. The
+  /// result does not depend on it.
+  std::vector<ViewWeight> weights(Eigen::Vector3d const& direction, std::size_t& face) const;
+  std::vector<ViewWeight> weights(Eigen::Vector3d const& direction) const {
+    std::size_t face = 0;
+    return weights(direction, face);
+  }
   /// Triangles of the sphere whose corners are all views (of coinciding views the first), counter-clockwise seen from
   /// outside, for drawing; none on a turntable.
   std::vector<Eigen::Vector3i> const& triangles() const { return triangles_; }
@@ -38,11 +44,15 @@ class ViewSphere {
  private:
   void fill_caps();
   void mix_for_virtual_corners();
+  void link_faces();
+  Eigen::Vector3d share_of(Eigen::Vector3d const& eye, std::size_t face) const;
+  std::size_t locate(Eigen::Vector3d const& eye, std::size_t face) const;
 
   std::vector<Eigen::Vector3d> corners_;            ///< distinct directions of views, then virtual ones
   std::vector<std::vector<std::size_t>> views_at_;  ///< views of each real corner
   std::vector<std::vector<std::size_t>> mixture_;   ///< of each virtual corner: real corners, equally
   std::vector<Eigen::Vector3i> faces_;              ///< of all corners
+  std::vector<Eigen::Vector3i> across_;             ///< the face across the edge opposite to each corner
   std::vector<Eigen::Vector3i> triangles_;
 };
 

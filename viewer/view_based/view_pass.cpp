@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "mesh/padded_texture.h"
+#include "viewer/view_based/view_transform.h"
 
 namespace scanview {
 namespace {
@@ -33,61 +33,32 @@ uniform sampler2D feather;
 uniform samplerBuffer cos_phi;
 uniform vec3 gain;
 uniform float least_weight;
+uniform vec2 size;                 // of the picture
+uniform float use_cosine, use_feather;
+uniform vec3 line_color;           // of a wireframe; negative: the picture
 layout(location = 0) out vec4 color_and_weight;
 layout(location = 1) out float depth;
 void main() {
   vec2 st = texture_and_depth.xy / texture_and_depth.z;
-  float weight = texelFetch(cos_phi, gl_PrimitiveID).r * texture(feather, st).r;
-  color_and_weight = vec4(gain * texture(picture, st).rgb, clamp(weight, least_weight, 1.0));
+  // Spelled out, because OpenGL leaves the choice of the mipmap to the driver.
+  vec2 along_x = dFdx(st) * size, along_y = dFdy(st) * size;
+  float lod = 0.5 * log2(max(max(dot(along_x, along_x), dot(along_y, along_y)), 1.0));
+  float weight = mix(1.0, texelFetch(cos_phi, gl_PrimitiveID).r, use_cosine) *
+                 mix(1.0, textureLod(feather, st, 0.0).r, use_feather);
+  vec3 color = line_color.r < 0.0 ? gain * textureLod(picture, st, lod).rgb : line_color;
+  color_and_weight = vec4(color, clamp(weight, least_weight, 1.0));
   depth = texture_and_depth.w;
 }
 )";
 
-/// Rows of the homogeneous texture coordinates (s w, t w, w) of a point in camera coordinates: the centre of the
-/// top-left pixel is at half a texel.
-Eigen::Matrix<double, 3, 4> texture_from_camera(Camera const& camera) {
-  double const w = camera.width(), h = camera.height();
-  Eigen::Matrix<double, 3, 4> m = Eigen::Matrix<double, 3, 4>::Zero();
-  int const scale = camera.is_perspective() ? 2 : 3;  // multiplies z, or 1
-  m(0, 0) = camera.fx() / w;
-  m(0, scale) = (camera.cx() + 0.5) / w;
-  m(1, 1) = camera.fy() / h;
-  m(1, scale) = (camera.cy() + 0.5) / h;
-  m(2, scale) = 1;
-  return m;
-}
-
-struct DepthRange {
-  double near = 0, far = 0;
-};
-
-/// Of the view's bounds in the rendering camera; false where all of it is behind a perspective camera.
-bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& camera_from_source, bool perspective,
-                 DepthRange& range) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (int i = 0; i < 8; ++i) {
-    double const z = (camera_from_source * bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i))).z();
-    low = std::min(low, z);
-    high = std::max(high, z);
-  }
-  double const margin = 1e-3 * std::max(high - low, 1e-3 * std::max(std::abs(low), std::abs(high))) + 1e-30;
-  range.near = low - margin;
-  range.far = high + margin;
-  if (!perspective) return true;
-  // Nothing nearer than this share of the furthest depth is drawn: it would be magnified beyond any meaning.
-  constexpr double kNearest = 1e-4;
-  range.near = std::max(range.near, kNearest * range.far);
-  return high > 0;
-}
-
 /// OpenGL's clip coordinates of a point in camera coordinates. The picture's top row is OpenGL's row 0, so that pixels
 /// lie in memory as they should; that mirrors the winding.
 Matrix4d clip_from_camera(Camera const& camera, DepthRange const& range) {
-  Eigen::Matrix<double, 3, 4> const texture = texture_from_camera(camera);
+  Eigen::Matrix<double, 3, 4> const picture = picture_from_camera(camera);
   Matrix4d clip = Matrix4d::Zero();
-  clip.row(0) = 2 * texture.row(0) - texture.row(2);
-  clip.row(1) = 2 * texture.row(1) - texture.row(2);
-  clip.row(3) = texture.row(2);
+  clip.row(0) = 2 * picture.row(0) / camera.width() - picture.row(2);
+  clip.row(1) = 2 * picture.row(1) / camera.height() - picture.row(2);
+  clip.row(3) = picture.row(2);
   double const length = range.far - range.near;
   if (camera.is_perspective()) {
     clip.row(2) << 0, 0, (range.far + range.near) / length, -2 * range.far * range.near / length;
@@ -107,31 +78,29 @@ void clamp_to_edge(GlFunctions const& gl) {
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
 }
 
-void check_view_mesh(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh) {
+void check_limits(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid) {
   auto const refuse = [&](std::string const& why) {
     throw Error(ErrorCode::bad_input, {}, "view " + view.name + ": " + why);
   };
-  if (view_mesh.cos_phi.size() != view_mesh.mesh.triangles.size()) refuse("a mesh without one cosine a triangle");
   if (view_mesh.mesh.triangles.size() > static_cast<std::size_t>(gl.max_texture_buffer_size)) {
     refuse(fmt::format("{} triangles are more than OpenGL can hold here ({})", view_mesh.mesh.triangles.size(),
                        gl.max_texture_buffer_size));
   }
-  if (std::max(view_mesh.camera.width(), view_mesh.camera.height()) > gl.max_texture_size) {
-    refuse(fmt::format("a picture of {} x {} is more than OpenGL can hold here ({})", view_mesh.camera.width(),
-                       view_mesh.camera.height(), gl.max_texture_size));
+  if (std::max(pyramid.area.width, pyramid.area.height) > gl.max_texture_size) {
+    refuse(fmt::format("a picture of {} x {} is more than OpenGL can hold here ({})", pyramid.area.width,
+                       pyramid.area.height, gl.max_texture_size));
   }
 }
 
 }  // namespace
 
-GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh)
+GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid)
     : camera_(view_mesh.camera),
       object_from_camera_(*view.object_from_camera),
+      area_(pyramid.area),
       gain_(view.gain.cast<float>()),
       index_count_(static_cast<GLsizei>(3 * view_mesh.mesh.triangles.size())) {
-  if (empty()) return;
-  check_view_mesh(gl, view, view_mesh);
-  view_mesh.mesh.check();
+  check_limits(gl, view, view_mesh, pyramid);
   for (auto const& vertex : view_mesh.mesh.vertices) bounds_.extend(vertex.cast<double>());
 
   vertex_array_ = GlVertexArray(gl);
@@ -152,21 +121,22 @@ GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_m
   gl.BindTexture(GL_TEXTURE_BUFFER, cos_phi_texture_.name());
   gl.TexBuffer(GL_TEXTURE_BUFFER, GL_R32F, cos_phi_.name());
 
-  cv::Mat3b const picture = padded_texture(view.image, view_mesh);
   gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
   picture_ = GlTexture(gl);
   gl.BindTexture(GL_TEXTURE_2D, picture_.name());
-  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8_ALPHA8, picture.cols, picture.rows, 0, GL_BGR, GL_UNSIGNED_BYTE,
-                picture.data);
-  gl.GenerateMipmap(GL_TEXTURE_2D);
+  for (std::size_t level = 0; level < pyramid.levels.size(); ++level) {
+    cv::Mat3b const& picture = pyramid.levels[level];
+    gl.TexImage2D(GL_TEXTURE_2D, static_cast<GLint>(level), GL_SRGB8_ALPHA8, picture.cols, picture.rows, 0, GL_BGR,
+                  GL_UNSIGNED_BYTE, picture.data);
+  }
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   clamp_to_edge(gl);
 
-  cv::Mat1b const feather = view_mesh.feather.isContinuous() ? view_mesh.feather : cv::Mat1b(view_mesh.feather.clone());
   feather_ = GlTexture(gl);
   gl.BindTexture(GL_TEXTURE_2D, feather_.name());
-  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_R8, feather.cols, feather.rows, 0, GL_RED, GL_UNSIGNED_BYTE, feather.data);
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_R8, pyramid.feather.cols, pyramid.feather.rows, 0, GL_RED, GL_UNSIGNED_BYTE,
+                pyramid.feather.data);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   clamp_to_edge(gl);
@@ -181,7 +151,8 @@ bool ViewPass::in_front(GpuView const& view, Camera const& camera, Eigen::Isomet
                      range);
 }
 
-bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera) const {
+bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
+                    Look const& look) const {
   // In double precision: the two poses may be far from the origin, their difference is not.
   Eigen::Isometry3d const camera_from_source = object_from_camera.inverse() * view.object_from_camera_;
   DepthRange range;
@@ -189,7 +160,10 @@ bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d
   Eigen::Matrix4f const clip_from_source =
       (clip_from_camera(camera, range) * camera_from_source.matrix()).cast<float>();
   Matrix4d sample_from_source;
-  sample_from_source << texture_from_camera(view.camera_), camera_from_source.matrix().row(2);
+  Eigen::Matrix<double, 3, 4> texture = picture_from_camera(view.camera_, view.area_.x, view.area_.y);
+  texture.row(0) /= view.area_.width;
+  texture.row(1) /= view.area_.height;
+  sample_from_source << texture, camera_from_source.matrix().row(2);
   Eigen::Matrix4f const samples = sample_from_source.cast<float>();
 
   gl_.Enable(GL_DEPTH_TEST);
@@ -203,6 +177,10 @@ bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d
   gl_.UniformMatrix4fv(program_.uniform("sample_from_source"), 1, GL_FALSE, samples.data());
   gl_.Uniform3f(program_.uniform("gain"), view.gain_.x(), view.gain_.y(), view.gain_.z());
   gl_.Uniform1f(program_.uniform("least_weight"), kLeastPixelWeight);
+  gl_.Uniform2f(program_.uniform("size"), static_cast<float>(view.area_.width), static_cast<float>(view.area_.height));
+  gl_.Uniform1f(program_.uniform("use_cosine"), look.cosine ? 1 : 0);
+  gl_.Uniform1f(program_.uniform("use_feather"), look.feather ? 1 : 0);
+  gl_.Uniform3f(program_.uniform("line_color"), -1, -1, -1);
   gl_.ActiveTexture(GL_TEXTURE0);
   gl_.BindTexture(GL_TEXTURE_2D, view.picture_.name());
   gl_.ActiveTexture(GL_TEXTURE1);
@@ -214,6 +192,13 @@ bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d
   gl_.Uniform1i(program_.uniform("cos_phi"), 2);
   gl_.BindVertexArray(view.vertex_array_.name());
   gl_.DrawElements(GL_TRIANGLES, view.index_count_, GL_UNSIGNED_INT, nullptr);
+  if (look.wireframe) {
+    gl_.Uniform3f(program_.uniform("line_color"), look.wireframe->x(), look.wireframe->y(), look.wireframe->z());
+    gl_.PolygonMode(GL_FRONT_AND_BACK, GL_LINE);
+    gl_.DepthFunc(GL_LEQUAL);
+    gl_.DrawElements(GL_TRIANGLES, view.index_count_, GL_UNSIGNED_INT, nullptr);
+    gl_.PolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+  }
   return true;
 }
 

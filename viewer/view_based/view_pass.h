@@ -1,26 +1,25 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "acquire/scan_set.h"
 #include "mesh/view_mesh.h"
 #include "viewer/gl/gl_objects.h"
+#include "viewer/view_based/picture_pyramid.h"
 
 namespace scanview {
 
-/// One view on the GPU: its triangles, picture (padded, sRGB, with mipmaps), feather and cosines. Boundary pixels of
-/// the mesh have feather 0; they keep a pixel weight of kLeastPixelWeight, so that a view that is alone there still
-/// shows.
-inline constexpr float kLeastPixelWeight = 1e-4F;
+/// One view on the GPU: its triangles, picture (sRGB, with mipmaps), feather and cosines.
 class GpuView {
  public:
   /// Throws Error{bad_input} where sizes do not fit each other or exceed what OpenGL can do here.
-  GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh);
-  bool empty() const { return index_count_ == 0; }
+  GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid);
 
  private:
   friend class ViewPass;
   Camera camera_;
   Eigen::Isometry3d object_from_camera_;
+  cv::Rect area_;
   Eigen::Vector3f gain_;
   Eigen::AlignedBox3d bounds_;  ///< of the vertices, in the view's camera coordinates
   GLsizei index_count_ = 0;
@@ -37,7 +36,12 @@ class ViewPass {
   /// Into the framebuffer that is bound (LayerTargets::begin_layer): linear light times gain and the pixel weight
   /// w_cos · w_feather; z in the camera. Back faces are culled. False (and nothing is drawn) where all of the view lies
   /// behind the camera.
-  bool draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera) const;
+  struct Look {
+    bool cosine = true, feather = true;           ///< whether they count in the weight
+    std::optional<Eigen::Vector3f> wireframe;     ///< edges over the picture, in this colour
+  };
+  bool draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
+            Look const& look) const;
   /// Whether draw() would draw something: cheap.
   static bool in_front(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera);
 

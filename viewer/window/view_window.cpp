@@ -27,7 +27,7 @@ class ViewWindow {
         window_(options.width, options.height, options.title),
         gl_(load_gl_functions(window_)),
         presenter_(gl_),
-        renderer_(make_view_based_renderer(window_, set, meshes, options.rendering)) {
+        renderer_(make_gl_renderer(window_, std::make_shared<ViewLibrary>(set, meshes), options.rendering)) {
     GlfwWindow::Events events;
     events.drag = [this](double right, double down, bool pan) {
       if (pan) {

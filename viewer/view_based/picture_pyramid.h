@@ -1,0 +1,21 @@
+#pragma once
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "mesh/view_mesh.h"
+
+namespace scanview {
+
+/// A view's picture where its mesh covers it, in falling resolution: what both back ends sample, so that they draw the
+/// same. Level 0 is `area` of the picture; each next one is half as large (rounded down), the mean of what it covers,
+/// taken in linear light, down to a single pixel. 8-bit sRGB (BGR).
+struct PicturePyramid {
+  cv::Rect area;  ///< with a pixel around the mesh, inside the picture
+  std::vector<cv::Mat3b> levels;
+  cv::Mat1b feather;  ///< of `area`
+};
+
+/// `padded`: padded_texture() of the view.
+PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mesh);
+
+}  // namespace scanview

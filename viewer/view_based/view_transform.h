@@ -1,0 +1,26 @@
+#pragma once
+#include <Eigen/Geometry>
+
+#include "calib/camera.h"
+
+namespace scanview {
+
+/// Boundary pixels of a mesh have feather 0; they keep this pixel weight, so that a view that is alone there still
+/// shows.
+inline constexpr float kLeastPixelWeight = 1e-4F;
+
+/// Rows of the homogeneous coordinates (u w, v w, w) of a point in camera coordinates, in pixels: those of an area of
+/// the picture that starts at pixel (x, y), whose corner has (0, 0) (a pixel's centre lies at half a pixel). w is z of a
+/// perspective camera and 1 of an orthographic one (Darsa 1998, appendix).
+Eigen::Matrix<double, 3, 4> picture_from_camera(Camera const& camera, int x = 0, int y = 0);
+
+struct DepthRange {
+  double near = 0, far = 0;
+};
+/// Of a box (in a source camera's coordinates) as another camera sees it, with a small margin; near is at least a
+/// ten-thousandth of far for a perspective camera: what is nearer would be magnified beyond any meaning. False where
+/// all of it is behind a perspective camera.
+bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& camera_from_source, bool perspective,
+                 DepthRange& range);
+
+}  // namespace scanview
