@@ -27,7 +27,7 @@ void LayerTargets::resize(int width, int height, int layers) {
   nearest(GL_TEXTURE_2D_ARRAY);
   depth_ = GlTexture(gl_);
   gl_.BindTexture(GL_TEXTURE_2D_ARRAY, depth_.name());
-  gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R32F, width, height, layers, 0, GL_RED, GL_FLOAT, nullptr);
+  gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RG32F, width, height, layers, 0, GL_RG, GL_FLOAT, nullptr);
   nearest(GL_TEXTURE_2D_ARRAY);
   depth_buffer_ = GlTexture(gl_);
   gl_.BindTexture(GL_TEXTURE_2D, depth_buffer_.name());

@@ -4,8 +4,9 @@
 namespace scanview {
 
 /// Where the views are drawn before they are composed: a layer a view of two float texture arrays, `color`
-/// (RGBA16F: linear light, and in alpha the pixel weight, 0 where nothing was drawn) and `depth` (R32F: z in the
-/// rendering camera). Row 0 is the top row of the picture. Layers share one depth buffer.
+/// (RGBA16F: linear light) and `depth` (RG32F: z in the rendering camera and the pixel weight, 0 where nothing was
+/// drawn; 16 bits would let the back ends disagree on which samples count). Row 0 is the top row of the picture. Layers
+/// share one depth buffer.
 class LayerTargets {
  public:
   explicit LayerTargets(GlFunctions const& gl);

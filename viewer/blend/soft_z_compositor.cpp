@@ -51,7 +51,7 @@ void main() {
   int count = 0;
   float good = 0.0;
   for (int i = 0; i < layer_count; ++i) {
-    float q = texelFetch(color_layers, ivec3(pixel, i), 0).a;
+    float q = texelFetch(depth_layers, ivec3(pixel, i), 0).g;
     if (q > 0.0) {
       quality[count] = q;
       layer[count++] = i;

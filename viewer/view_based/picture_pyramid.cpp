@@ -81,4 +81,12 @@ PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mes
   return pyramid;
 }
 
+std::vector<std::uint16_t> cosine_labels(ViewMesh const& view_mesh) {
+  std::vector<std::uint16_t> labels;
+  for (float const cosine : view_mesh.cos_phi) {
+    labels.push_back(static_cast<std::uint16_t>(std::lround(65535 * std::clamp(cosine, 0.0F, 1.0F))));
+  }
+  return labels;
+}
+
 }  // namespace scanview

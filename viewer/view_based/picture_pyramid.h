@@ -18,4 +18,7 @@ struct PicturePyramid {
 /// `padded`: padded_texture() of the view.
 PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mesh);
 
+/// cos φ of each triangle in 16 bits: 65535 is 1.
+std::vector<std::uint16_t> cosine_labels(ViewMesh const& view_mesh);
+
 }  // namespace scanview

@@ -36,18 +36,29 @@ uniform float least_weight;
 uniform vec2 size;                 // of the picture
 uniform float use_cosine, use_feather;
 uniform vec3 line_color;           // of a wireframe; negative: the picture
-layout(location = 0) out vec4 color_and_weight;
-layout(location = 1) out float depth;
+layout(location = 0) out vec3 color;
+layout(location = 1) out vec2 depth_and_weight;
+
+// Spelled out, because drivers filter 8-bit textures with few bits.
+float feather_at(vec2 st) {
+  vec2 place = clamp(st * size - 0.5, vec2(0.0), size - 1.0);
+  vec2 share = fract(place);
+  ivec2 here = ivec2(place), next = min(here + 1, ivec2(size) - 1);
+  vec2 upper = vec2(texelFetch(feather, here, 0).r, texelFetch(feather, ivec2(next.x, here.y), 0).r);
+  vec2 lower = vec2(texelFetch(feather, ivec2(here.x, next.y), 0).r, texelFetch(feather, next, 0).r);
+  vec2 column = mix(upper, lower, share.y);
+  return mix(column.x, column.y, share.x);
+}
+
 void main() {
   vec2 st = texture_and_depth.xy / texture_and_depth.z;
   // Spelled out, because OpenGL leaves the choice of the mipmap to the driver.
   vec2 along_x = dFdx(st) * size, along_y = dFdy(st) * size;
   float lod = 0.5 * log2(max(max(dot(along_x, along_x), dot(along_y, along_y)), 1.0));
   float weight = mix(1.0, texelFetch(cos_phi, gl_PrimitiveID).r, use_cosine) *
-                 mix(1.0, textureLod(feather, st, 0.0).r, use_feather);
-  vec3 color = line_color.r < 0.0 ? gain * textureLod(picture, st, lod).rgb : line_color;
-  color_and_weight = vec4(color, clamp(weight, least_weight, 1.0));
-  depth = texture_and_depth.w;
+                 mix(1.0, feather_at(st), use_feather);
+  color = line_color.r < 0.0 ? gain * textureLod(picture, st, lod).rgb : line_color;
+  depth_and_weight = vec2(texture_and_depth.w, clamp(weight, least_weight, 1.0));
 }
 )";
 
@@ -116,10 +127,11 @@ GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_m
   gl.BindVertexArray(0);
 
   cos_phi_ = GlBuffer(gl);
-  upload_buffer(gl, GL_TEXTURE_BUFFER, cos_phi_, view_mesh.cos_phi.size() * sizeof(float), view_mesh.cos_phi.data());
+  std::vector<std::uint16_t> const cosines = cosine_labels(view_mesh);
+  upload_buffer(gl, GL_TEXTURE_BUFFER, cos_phi_, cosines.size() * sizeof(std::uint16_t), cosines.data());
   cos_phi_texture_ = GlTexture(gl);
   gl.BindTexture(GL_TEXTURE_BUFFER, cos_phi_texture_.name());
-  gl.TexBuffer(GL_TEXTURE_BUFFER, GL_R32F, cos_phi_.name());
+  gl.TexBuffer(GL_TEXTURE_BUFFER, GL_R16, cos_phi_.name());
 
   gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
   picture_ = GlTexture(gl);

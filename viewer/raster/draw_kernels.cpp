@@ -1,0 +1,303 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "viewer/raster/kernels.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "viewer/raster/draw_kernels.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once for each instruction set
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace scanview {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Triangles are small: eight pixels at a time, also where the processor could do sixteen.
+using Floats = hn::CappedTag<float, 8>;
+using Ints = hn::RebindToSigned<Floats>;
+using Words = hn::RebindToUnsigned<Floats>;
+
+void TransformVertices(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t begin,
+                       std::size_t end, int width, int height, ScreenVertex* out) {
+  Floats const d;
+  Ints const di;
+  std::size_t const lanes = hn::Lanes(d);
+  float m[ScreenTransform::kRows][4];
+  for (int r = 0; r < ScreenTransform::kRows; ++r) {
+    for (int c = 0; c < 4; ++c) m[r][c] = static_cast<float>(transform.rows[r][c]);
+  }
+  auto const one = hn::Set(d, 1.0F), subpixels = hn::Set(d, 256.0F);
+  auto const low = hn::Set(d, -256.0F * kGuardBand), near = hn::Set(d, static_cast<float>(transform.near));
+  auto const right = hn::Set(d, 256.0F * static_cast<float>(width + kGuardBand));
+  auto const bottom = hn::Set(d, 256.0F * static_cast<float>(height + kGuardBand));
+  HWY_ALIGN float value[4][8];
+  HWY_ALIGN std::int32_t x[8], y[8];
+  for (std::size_t i = begin; i < end; i += lanes) {
+    auto const px = hn::LoadU(d, &vertices.x[i]), py = hn::LoadU(d, &vertices.y[i]), pz = hn::LoadU(d, &vertices.z[i]);
+    auto const row = [&](int r) HWY_ATTR {
+      auto const a = hn::Add(hn::Mul(hn::Set(d, m[r][0]), px), hn::Mul(hn::Set(d, m[r][1]), py));
+      return hn::Add(hn::Add(a, hn::Mul(hn::Set(d, m[r][2]), pz)), hn::Set(d, m[r][3]));
+    };
+    auto const w = row(ScreenTransform::w);
+    auto const inverse = transform.perspective ? hn::Div(one, w) : one;
+    auto const u = hn::Mul(hn::Mul(row(ScreenTransform::u), inverse), subpixels);
+    auto const v = hn::Mul(hn::Mul(row(ScreenTransform::v), inverse), subpixels);
+    auto inside = hn::And(hn::And(hn::Ge(u, low), hn::Le(u, right)), hn::And(hn::Ge(v, low), hn::Le(v, bottom)));
+    if (transform.perspective) inside = hn::And(inside, hn::Gt(w, near));
+    auto const fixed_u = hn::NearestInt(hn::IfThenElseZero(inside, u));
+    hn::Store(hn::IfThenElse(hn::RebindMask(di, inside), fixed_u, hn::Set(di, kBeyond)), di, x);
+    hn::Store(hn::NearestInt(hn::IfThenElseZero(inside, v)), di, y);
+    hn::Store(transform.perspective ? inverse : hn::Neg(row(ScreenTransform::depth)), d, value[0]);
+    hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[1]);
+    hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[2]);
+    hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[3]);
+    std::size_t const count = std::min(lanes, end - i);
+    for (std::size_t k = 0; k < count; ++k) {
+      out[i + k] = {x[k], y[k], {value[0][k], value[1][k], value[2][k], value[3][k]}};
+    }
+  }
+}
+
+/// log2 of x >= 1, within 0.001.
+template <class V>
+HWY_INLINE V Log2(V x) {
+  Floats const d;
+  Ints const di;
+  auto const bits = hn::BitCast(di, x);
+  auto const exponent = hn::ConvertTo(d, hn::Sub(hn::ShiftRight<23>(bits), hn::Set(di, 127)));
+  auto const mantissa =
+      hn::BitCast(d, hn::Or(hn::And(bits, hn::Set(di, 0x7fffff)), hn::Set(di, 0x3f800000)));
+  auto const r = hn::Sub(mantissa, hn::Set(d, 1.0F));
+  // A cubic that is exact at both ends, so that levels join without a step.
+  auto const p = hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Set(d, 0.15922F), r), hn::Set(d, -0.58208F)), r),
+                         hn::Set(d, 1.42286F));
+  return hn::Add(exponent, hn::Mul(r, p));
+}
+
+/// What is constant for one triangle: the slopes of key, s, t, w on the screen.
+struct Slopes {
+  float x[4], y[4];
+};
+
+class TextureWriter {
+ public:
+  explicit TextureWriter(TextureTarget const& target) : target_(target) {}
+  float* keys() const { return target_.key; }
+  bool wants_edges() const { return target_.wireframe; }
+
+  template <class M, class V>
+  HWY_INLINE void Write(std::size_t at, M mask, V key, float const* base, V lane, Slopes const& slopes,
+                        std::uint32_t label, M on_edge) const {
+    Floats const d;
+    Words const du;
+    Ints const di;
+    auto const plane = [&](int k) HWY_ATTR {
+      return hn::Add(hn::Set(d, base[k]), hn::Mul(hn::Set(d, slopes.x[k]), lane));
+    };
+    auto const inverse = hn::Div(hn::Set(d, 1.0F), plane(3));
+    auto const s = hn::Mul(plane(1), inverse), t = hn::Mul(plane(2), inverse);
+    auto packed = hn::Set(du, label << 16);
+    if (target_.largest_lod > 0) {
+      auto const slope = [&](float of_value, float of_w, V value) HWY_ATTR {
+        return hn::Sub(hn::Set(d, of_value), hn::Mul(value, hn::Set(d, of_w)));
+      };
+      auto const sx = slope(slopes.x[1], slopes.x[3], s), tx = slope(slopes.x[2], slopes.x[3], t);
+      auto const sy = slope(slopes.y[1], slopes.y[3], s), ty = slope(slopes.y[2], slopes.y[3], t);
+      auto const along_x = hn::Add(hn::Mul(sx, sx), hn::Mul(tx, tx));
+      auto const along_y = hn::Add(hn::Mul(sy, sy), hn::Mul(ty, ty));
+      auto const rho = hn::Mul(hn::Max(along_x, along_y), hn::Mul(inverse, inverse));
+      auto const minified = hn::Gt(rho, hn::Set(d, 1.0F));
+      if (!hn::AllFalse(d, minified)) {
+        auto lod = hn::Mul(hn::Set(d, 0.5F), Log2(hn::Min(hn::Max(rho, hn::Set(d, 1.0F)), hn::Set(d, 1e30F))));
+        lod = hn::Min(lod, hn::Set(d, target_.largest_lod));
+        packed = hn::Or(packed, hn::BitCast(du, hn::ConvertTo(di, hn::Mul(lod, hn::Set(d, 2048.0F)))));
+      }
+    }
+    packed = hn::Or(packed, hn::IfThenElseZero(hn::RebindMask(du, on_edge), hn::Set(du, 1U << 15)));
+    auto const store = [&](float* to, V value) HWY_ATTR {
+      hn::StoreU(hn::IfThenElse(mask, value, hn::LoadU(d, to + at)), d, to + at);
+    };
+    store(target_.key, key);
+    store(target_.s, s);
+    store(target_.t, t);
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(du, mask), packed, hn::LoadU(du, target_.packed + at)), du,
+               target_.packed + at);
+  }
+
+ private:
+  TextureTarget target_;
+};
+
+class IdWriter {
+ public:
+  explicit IdWriter(IdTarget const& target) : target_(target) {}
+  float* keys() const { return target_.key; }
+  bool wants_edges() const { return false; }
+
+  template <class M, class V>
+  HWY_INLINE void Write(std::size_t at, M mask, V key, float const*, V, Slopes const&, std::uint32_t label, M) const {
+    Floats const d;
+    Words const du;
+    hn::StoreU(hn::IfThenElse(mask, key, hn::LoadU(d, target_.key + at)), d, target_.key + at);
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(du, mask), hn::Set(du, label), hn::LoadU(du, target_.id + at)), du,
+               target_.id + at);
+  }
+
+ private:
+  IdTarget target_;
+};
+
+template <class Writer>
+HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& area, Writer const& writer) {
+  Floats const d;
+  Ints const di;
+  int const lanes = static_cast<int>(hn::Lanes(d));
+  ScreenVertex const& a = *triangle.corners[0];
+  ScreenVertex const& b = *triangle.corners[1];
+  ScreenVertex const& c = *triangle.corners[2];
+
+  // Pixel centres inside the bounding box, inside the tile.
+  int const left = std::max((std::min({a.x, b.x, c.x}) + 255) >> 8, area.left);
+  int const right = std::min(std::max({a.x, b.x, c.x}) >> 8, area.right - 1);
+  int const top = std::max((std::min({a.y, b.y, c.y}) + 255) >> 8, area.top);
+  int const bottom = std::min(std::max({a.y, b.y, c.y}) >> 8, area.bottom - 1);
+  if (left > right || top > bottom) return;
+
+  // Edge functions E = A x + B y + C, at least 0 inside; in units of 256 subpixels at pixel centres, where the rest of
+  // C is rounded down: that changes no sign. Top and left edges own their points.
+  int step_x[3], step_y[3], start[3];
+  ScreenVertex const* const corners[] = {&a, &b, &c};
+  for (int k = 0; k < 3; ++k) {
+    ScreenVertex const& from = *corners[k];
+    ScreenVertex const& to = *corners[k == 2 ? 0 : k + 1];
+    int const ex = from.y - to.y, ey = to.x - from.x;
+    bool const owns = ex > 0 || (ex == 0 && ey > 0);
+    std::int64_t const constant =
+        -(std::int64_t{ex} * from.x + std::int64_t{ey} * from.y) - (owns ? 0 : 1);
+    std::int64_t const at_start = (constant >> 8) + std::int64_t{ex} * left + std::int64_t{ey} * top;
+    // Beyond what the steps within a tile can make up for.
+    constexpr std::int64_t kFar = 1 << 30;
+    step_x[k] = ex;
+    step_y[k] = ey;
+    start[k] = static_cast<int>(std::clamp(at_start, -kFar, kFar));
+  }
+
+  // Slopes of what is linear on the screen, a pixel.
+  float const dx1 = static_cast<float>(b.x - a.x), dy1 = static_cast<float>(b.y - a.y);
+  float const dx2 = static_cast<float>(c.x - a.x), dy2 = static_cast<float>(c.y - a.y);
+  std::int64_t const area2 = std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
+  float const scale = 256.0F / static_cast<float>(area2);
+  float const a_x = static_cast<float>(a.x) / 256, a_y = static_cast<float>(a.y) / 256;
+  Slopes slopes;
+  float at_left[4];
+  for (int k = 0; k < 4; ++k) {
+    float const at_a = a.values[k], d1 = b.values[k] - at_a, d2 = c.values[k] - at_a;
+    slopes.x[k] = (d1 * dy2 - d2 * dy1) * scale;
+    slopes.y[k] = (d2 * dx1 - d1 * dx2) * scale;
+    at_left[k] = at_a + slopes.x[k] * (static_cast<float>(left) - a_x);
+  }
+
+  // For wireframes: the distance from an edge in pixels is E / length.
+  float edge_scale[3] = {0, 0, 0};
+  if (writer.wants_edges()) {
+    for (int k = 0; k < 3; ++k) {
+      float const ex = static_cast<float>(step_x[k]), ey = static_cast<float>(step_y[k]);
+      edge_scale[k] = 256.0F / std::max(1.0F, std::sqrt(ex * ex + ey * ey));
+    }
+  }
+
+  auto const iota = hn::Iota(di, 0);
+  auto const step0 = hn::Mul(hn::Set(di, step_x[0]), iota), step1 = hn::Mul(hn::Set(di, step_x[1]), iota),
+             step2 = hn::Mul(hn::Set(di, step_x[2]), iota);
+  for (int y = top; y <= bottom; ++y) {
+    int const down = y - top;
+    auto e0 = hn::Add(hn::Set(di, start[0] + step_y[0] * down), step0);
+    auto e1 = hn::Add(hn::Set(di, start[1] + step_y[1] * down), step1);
+    auto e2 = hn::Add(hn::Set(di, start[2] + step_y[2] * down), step2);
+    float base[4];
+    for (int k = 0; k < 4; ++k) base[k] = at_left[k] + slopes.y[k] * (static_cast<float>(y) - a_y);
+    auto lane = hn::Iota(d, 0);  // pixels from `left`: exact, so that sums do not depend on the vector's width
+    std::size_t at = static_cast<std::size_t>((y - area.top) * kTileStride + (left - area.left));
+    for (int x = left; x <= right; x += lanes) {
+      auto const covered = hn::Gt(hn::Or(hn::Or(e0, e1), e2), hn::Set(di, -1));
+      if (!hn::AllFalse(di, covered)) {
+        auto const key = hn::Add(hn::Set(d, base[0]), hn::Mul(hn::Set(d, slopes.x[0]), lane));
+        auto const mask = hn::And(hn::RebindMask(d, covered), hn::Gt(key, hn::LoadU(d, writer.keys() + at)));
+        if (!hn::AllFalse(d, mask)) {
+          auto on_edge = hn::FirstN(d, 0);
+          if (writer.wants_edges()) {
+            auto const distance = [&](auto e, int k) HWY_ATTR {
+              return hn::Mul(hn::ConvertTo(d, e), hn::Set(d, edge_scale[k]));
+            };
+            on_edge = hn::Lt(hn::Min(hn::Min(distance(e0, 0), distance(e1, 1)), distance(e2, 2)), hn::Set(d, 0.6F));
+          }
+          writer.Write(at, mask, key, base, lane, slopes, triangle.label, on_edge);
+        }
+      }
+      e0 = hn::Add(e0, hn::Set(di, step_x[0] * lanes));
+      e1 = hn::Add(e1, hn::Set(di, step_x[1] * lanes));
+      e2 = hn::Add(e2, hn::Set(di, step_x[2] * lanes));
+      lane = hn::Add(lane, hn::Set(d, static_cast<float>(lanes)));
+      at += static_cast<std::size_t>(lanes);
+    }
+  }
+}
+
+void DrawTextured(ScreenTriangle const* triangles, std::size_t count, TileArea const& area,
+                  TextureTarget const& target) {
+  TextureWriter const writer(target);
+  for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+}
+
+void DrawIds(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target) {
+  IdWriter const writer(target);
+  for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace scanview
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace scanview {
+
+HWY_EXPORT(TransformVertices);
+HWY_EXPORT(DrawTextured);
+HWY_EXPORT(DrawIds);
+
+void transform_vertices(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t begin,
+                        std::size_t end, int width, int height, ScreenVertex* out) {
+  HWY_DYNAMIC_DISPATCH(TransformVertices)(vertices, transform, begin, end, width, height, out);
+}
+
+void draw_textured(ScreenTriangle const* triangles, std::size_t count, TileArea const& area,
+                   TextureTarget const& target) {
+  HWY_DYNAMIC_DISPATCH(DrawTextured)(triangles, count, area, target);
+}
+
+void draw_ids(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target) {
+  HWY_DYNAMIC_DISPATCH(DrawIds)(triangles, count, area, target);
+}
+
+std::vector<char const*> kernel_targets() {
+  std::vector<char const*> names;
+  for (std::int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
+    names.push_back(hwy::TargetName(targets & -targets));
+  }
+  return names;
+}
+
+void use_kernel_target(char const* name) {
+  hwy::SetSupportedTargetsForTest(0);
+  std::int64_t chosen = 0;
+  for (std::int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
+    if (std::strcmp(hwy::TargetName(targets & -targets), name) == 0) chosen = targets & -targets;
+  }
+  hwy::SetSupportedTargetsForTest(chosen);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+}  // namespace scanview
+#endif

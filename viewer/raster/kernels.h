@@ -1,0 +1,52 @@
+#pragma once
+#include "viewer/raster/raster_types.h"
+
+namespace scanview {
+
+// The inner loops, in the instruction set that the processor has (Highway, chosen at run time). All sets compute the
+// same bits: no fused multiply-add, no approximate reciprocals.
+
+/// Vertices [begin, end); begin a multiple of 16. Rounds to 1/256 pixel.
+void transform_vertices(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t begin,
+                        std::size_t end, int width, int height, ScreenVertex* out);
+
+/// Draws triangles into a tile: pixels whose centre is inside (top-left rule), nearer than what is there; of equal
+/// depths the first stays.
+void draw_textured(ScreenTriangle const* triangles, std::size_t count, TileArea const& area,
+                   TextureTarget const& target);
+void draw_ids(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target);
+
+/// A layer of a tile for the compositor.
+struct ComposedLayer {
+  TextureTarget samples;
+  RasterTexture const* texture = nullptr;
+  float* quality = nullptr;  ///< scratch: w_cos · w_feather of each sample
+  float gain[3] = {1, 1, 1};  ///< R, G, B
+  float hue[3] = {1, 1, 1};
+  float weight = 0, fill = 0;
+  bool cosine = true, feather = true;  ///< whether they count in the weight
+};
+/// How layers are mixed: SoftZ, as single precision with finite numbers.
+struct Composition {
+  float threshold = 0, ramp = 0;  ///< ramp: 1 / (half a threshold)
+  float reliability_ratio = 0.1F;
+  float good_enough = 0, good_at_zero = 0, good_quality = 0, fair_quality = 0, least_weight = 0;
+  bool nearest = false;
+  int show = 0;
+  bool perspective = true;
+};
+/// Quality of the layer's samples, and added to `good` weight · min(1, good_at_zero + quality / good_quality).
+void measure_quality(ComposedLayer const& layer, Composition const& how, TileArea const& area, float* good);
+/// Turns `good` into how much fill is needed, 0 to 1; returns whether any pixel needs some.
+bool measure_need(Composition const& how, TileArea const& area, float* good);
+/// Mixes layers into the picture: BGRA bytes and depth, rows `color_stride` and `depth_stride` elements apart, starting
+/// at the tile's first pixel.
+void compose_layers(ComposedLayer const* layers, std::size_t count, Composition const& how, TileArea const& area,
+                    float const* need, std::uint32_t* color, std::size_t color_stride, float* depth,
+                    std::size_t depth_stride);
+
+/// The instruction sets this processor can run, by name, and a way to allow only one of them (tests): "" for all.
+std::vector<char const*> kernel_targets();
+void use_kernel_target(char const* name);
+
+}  // namespace scanview

@@ -1,0 +1,133 @@
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "viewer/raster/layer_rasterizer.h"
+#include "viewer/view_based/raster_view.h"
+#include "viewer/view_based/view_based_renderer.h"
+#include "viewer/view_based/view_transform.h"
+
+namespace scanview {
+namespace {
+
+/// SoftZ for the kernels: infinite and zero thresholds stay finite and mean the same.
+Composition composition(SoftZ const& soft_z, Camera const& camera) {
+  constexpr double kLargest = 1e30;
+  double const threshold = std::min(soft_z.threshold, kLargest);
+  Composition how;
+  how.threshold = static_cast<float>(threshold);
+  how.ramp = static_cast<float>(threshold > 0 ? std::min(2 / threshold, kLargest) : kLargest);
+  how.reliability_ratio = static_cast<float>(soft_z.reliability_ratio);
+  how.good_enough = static_cast<float>(SoftZ::kGoodEnough);
+  how.good_at_zero = static_cast<float>(SoftZ::kGoodAtZero);
+  how.good_quality = static_cast<float>(SoftZ::kGoodQuality);
+  how.fair_quality = static_cast<float>(SoftZ::kFairQuality);
+  how.least_weight = kLeastPixelWeight;
+  how.nearest = soft_z.nearest;
+  how.show = static_cast<int>(soft_z.show);
+  how.perspective = camera.is_perspective();
+  return how;
+}
+
+class CpuRenderer final : public ViewBasedRenderer {
+ public:
+  CpuRenderer(std::shared_ptr<ViewLibrary> library, ViewBasedOptions const& options, int threads)
+      : ViewBasedRenderer(std::move(library), options), rasterizer_(threads) {
+    views_.resize(this->library().meshes().size());
+  }
+  BackEnd back_end() const override { return BackEnd::cpu; }
+
+ private:
+  bool ready(std::size_t view, bool wait) override {
+    if (views_[view]) return true;
+    cv::Mat3b const picture = wait ? library().picture(view) : library().picture_if_ready(view);
+    if (picture.empty()) return false;
+    views_[view].emplace(library().set().views[view], library().meshes()[view], picture);
+    return true;
+  }
+
+  Frame draw(std::vector<UsedView> const& views, Camera const& camera,
+             Eigen::Isometry3d const& object_from_camera) override {
+    Frame frame;
+    frame.color.create(camera.height(), camera.width());
+    frame.depth.create(camera.height(), camera.width());
+    stages_ = {{"triangles", 0}, {"pixels", 0}};
+    for (int y = 0; y < camera.height(); y += kBlock) {
+      for (int x = 0; x < camera.width(); x += kBlock) {
+        cv::Rect const block(x, y, std::min(kBlock, camera.width() - x), std::min(kBlock, camera.height() - y));
+        draw_block(views, camera.cropped(x, y, block.width, block.height), object_from_camera, frame.color(block),
+                   frame.depth(block));
+      }
+    }
+    return frame;
+  }
+
+  void draw_block(std::vector<UsedView> const& used, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
+                  cv::Mat4b color, cv::Mat1f depth) {
+    std::vector<LayerRasterizer::Layer> layers;
+    std::vector<ComposedLayer> composed;
+    for (auto const& view : used) {
+      RasterView const& raster = *views_[view.view];
+      LayerRasterizer::Layer layer;
+      if (!raster.transform_to(camera, object_from_camera, layer.transform)) continue;
+      layer.mesh = &raster.mesh();
+      layer.largest_lod = static_cast<float>(raster.texture().levels.size() - 1);
+      layer.wireframe = options().wireframe;
+      layers.push_back(layer);
+      ComposedLayer compose;
+      compose.texture = &raster.texture();
+      Eigen::Vector3f const hue = view_hue(view.view);
+      for (int c = 0; c < 3; ++c) {
+        compose.gain[c] = raster.gain()[c];
+        compose.hue[c] = hue[c];
+      }
+      compose.weight = static_cast<float>(view.weight);
+      compose.fill = static_cast<float>(view.fill);
+      compose.cosine = options().cosine;
+      compose.feather = options().feather;
+      composed.push_back(compose);
+    }
+    Composition const how = composition(soft_z(), camera);
+    rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
+      auto of_tile = composed;
+      float* const need = tile.scratch(0);
+      std::fill_n(need, LayerRasterizer::kTilePixels, 0.0F);
+      auto const draw_layer = [&](std::size_t i, float const* where) {
+        of_tile[i].samples = tile.draw(i, where);
+        of_tile[i].quality = tile.scratch(1 + i);
+        measure_quality(of_tile[i], how, tile.area, need);
+      };
+      for (std::size_t i = 0; i < of_tile.size(); ++i) {
+        if (of_tile[i].weight > 0) draw_layer(i, nullptr);
+      }
+      // Views that only fill are drawn where something is to be filled, and nowhere else.
+      std::size_t drawn = of_tile.size();
+      if (measure_need(how, tile.area, need)) {
+        for (std::size_t i = 0; i < of_tile.size(); ++i) {
+          if (!(of_tile[i].weight > 0)) draw_layer(i, need);
+        }
+      } else {
+        auto const end = std::stable_partition(of_tile.begin(), of_tile.end(),
+                                               [](ComposedLayer const& layer) { return layer.weight > 0; });
+        drawn = static_cast<std::size_t>(end - of_tile.begin());
+      }
+      auto* const pixels = reinterpret_cast<std::uint32_t*>(color.ptr(tile.area.top)) + tile.area.left;
+      compose_layers(of_tile.data(), drawn, how, tile.area, need, pixels, color.step1() / 4,
+                     depth.ptr<float>(tile.area.top) + tile.area.left, depth.step1());
+    });
+    stages_["triangles"] += rasterizer_.prepare_ms();
+    stages_["pixels"] += rasterizer_.tiles_ms();
+  }
+
+  LayerRasterizer rasterizer_;
+  std::vector<std::optional<RasterView>> views_;
+};
+
+}  // namespace
+
+std::unique_ptr<ViewBasedRenderer> make_cpu_renderer(std::shared_ptr<ViewLibrary> library,
+                                                     ViewBasedOptions const& options, int threads) {
+  return std::make_unique<CpuRenderer>(std::move(library), options, threads);
+}
+
+}  // namespace scanview
