@@ -11,7 +11,7 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
-/// "one": each view in turn; "every:N"; or names with commas.
+/// "one": each view in turn; "every:N": some of them in turn; or names with commas: together.
 std::vector<std::size_t> views_to_hold_out(ScanSet const& set, std::string const& which) {
   std::vector<std::size_t> views;
   std::size_t step = which == "one" ? 1 : 0;
@@ -44,26 +44,36 @@ Json to_json(ViewFigures const& f) {
           {"coverage", json_number(f.coverage)}};
 }
 
+template <typename Value>
+double mean_of(std::vector<ViewFigures> const& views, Value const& value) {
+  double sum = 0;
+  for (auto const& view : views) sum += value(view);
+  return views.empty() ? 0 : sum / static_cast<double>(views.size());
+}
+
 /// Means over the views. Times are left out: they differ from run to run, and the record must not.
 Json mean_figures(std::vector<ViewFigures> const& views) {
   if (views.empty()) return Json::object();
-  double psnr_common = 0, psnr_all = 0, ssim = 0, coverage = 0, least = std::numeric_limits<double>::infinity();
-  for (auto const& f : views) {
-    psnr_common += f.psnr_common, psnr_all += f.psnr_all, ssim += f.ssim, coverage += f.coverage;
-    least = std::min(least, f.psnr_common);
-  }
-  auto const n = static_cast<double>(views.size());
-  return {{"psnr_common", json_number(psnr_common / n)},
+  double least = std::numeric_limits<double>::infinity();
+  for (auto const& f : views) least = std::min(least, f.psnr_common);
+  return {{"psnr_common", json_number(mean_of(views, [](auto const& f) { return f.psnr_common; }))},
           {"psnr_common_min", json_number(least)},
-          {"psnr_all", json_number(psnr_all / n)},
-          {"ssim", json_number(ssim / n)},
-          {"coverage", json_number(coverage / n)}};
+          {"psnr_all", json_number(mean_of(views, [](auto const& f) { return f.psnr_all; }))},
+          {"ssim", json_number(mean_of(views, [](auto const& f) { return f.ssim; }))},
+          {"coverage", json_number(mean_of(views, [](auto const& f) { return f.coverage; }))},
+          {"outside", json_number(mean_of(views, [](auto const& f) { return f.outside; }))}};
 }
 
-double mean_milliseconds(std::vector<ViewFigures> const& views) {
-  double sum = 0;
-  for (auto const& f : views) sum += f.milliseconds;
-  return views.empty() ? 0 : sum / static_cast<double>(views.size());
+/// "difference_to_ours": theirs minus ours, on the pixels that both drew.
+Json to_json(ContenderFigures const& contender, bool is_ours) {
+  Json json = mean_figures(contender.views);
+  if (is_ours || contender.views.empty()) return json;
+  auto const negated = [](Interval const& lead) {
+    return Json{{"mean", json_number(-lead.mean)}, {"low", json_number(-lead.high)}, {"high", json_number(-lead.low)}};
+  };
+  json["difference_to_ours"] = negated(contender.psnr_lead);
+  json["ssim_difference_to_ours"] = negated(contender.ssim_lead);
+  return json;
 }
 
 }  // namespace
@@ -71,23 +81,32 @@ double mean_milliseconds(std::vector<ViewFigures> const& views) {
 StageOutcome evaluate_stage(fs::path const& folder, EvaluateRequest const& request, StageMode mode, Context& context) {
   ScanSet const manifest = read_manifest(folder);
   auto const held_out = views_to_hold_out(manifest, request.hold_out);
+  bool const by_name = request.hold_out != "one" && !request.hold_out.starts_with("every:");
   StageRecord record{"evaluate", {{"hold_out", request.hold_out}}, picture_inputs(folder, manifest), {}, {}};
-  double milliseconds = 0;
+  Json milliseconds = Json::object();
   StageOutcome outcome = run_stage(folder, std::move(record), mode, context, [&](StageRecord& out) {
     ScanSet const set = read_scan_set(folder, context);
-    auto const meshes = read_view_meshes(folder, set, context);
-    auto const gl = make_offscreen_context();
+    auto const library = std::make_shared<ViewLibrary>(set, read_view_meshes(folder, set, context));
+    std::vector<ContenderFigures> held;
     // A set of one view has nothing left to render it from.
-    auto const held =
-        set.views.size() > 1 ? evaluate_held_out(*gl, set, meshes, held_out, {}, context) : std::vector<ViewFigures>();
-    auto const source = evaluate_source_views(*gl, set, meshes, held_out, {}, context);
-    out.figures["renderers"] = {{"view_based", mean_figures(held)}, {"source_views", mean_figures(source)}};
+    if (set.views.size() > 1) {
+      auto contenders = make_contenders(set, library, {}, context);
+      held = evaluate_held_out(contenders, set, held_out, by_name ? HoldOut::together : HoldOut::each, context);
+    }
+    auto const source = evaluate_source_views(library, set, held_out, {}, context);
+    out.figures["renderers"] = Json::object();
+    for (auto const& one : held) {
+      out.figures["renderers"][one.name] = to_json(one, &one == &held.front());
+      milliseconds[one.name] = mean_of(one.views, [](auto const& f) { return f.milliseconds; });
+    }
+    out.figures["renderers"]["source_views"] = mean_figures(source);
     out.figures["views"] = Json::array();
-    for (auto const& f : held) out.figures["views"].push_back(to_json(f));
-    milliseconds = mean_milliseconds(source);
+    if (!held.empty()) {
+      for (auto const& f : held.front().views) out.figures["views"].push_back(to_json(f));
+    }
     return evaluate_section(held, source);
   });
-  if (milliseconds > 0) outcome.figures["renderers"]["view_based"]["milliseconds"] = milliseconds;
+  for (auto const& [name, value] : milliseconds.items()) outcome.figures["renderers"][name]["milliseconds"] = value;
   return outcome;
 }
 

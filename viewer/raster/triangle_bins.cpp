@@ -46,6 +46,25 @@ ScreenVertex on_screen(ClipVertex const& v, bool perspective) {
 
 }  // namespace
 
+RasterMesh raster_mesh(TriangleMesh const& mesh, std::vector<std::uint32_t> labels) {
+  RasterMesh result;
+  auto& arrays = result.vertices;
+  arrays.count = mesh.vertices.size();
+  constexpr std::size_t kPadding = 16;
+  for (auto* const array : {&arrays.x, &arrays.y, &arrays.z}) array->assign(arrays.count + kPadding, 0.0F);
+  for (std::size_t i = 0; i < arrays.count; ++i) {
+    arrays.x[i] = mesh.vertices[i].x();
+    arrays.y[i] = mesh.vertices[i].y();
+    arrays.z[i] = mesh.vertices[i].z();
+  }
+  result.corners.reserve(3 * mesh.triangles.size());
+  for (auto const& triangle : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) result.corners.push_back(triangle[k]);
+  }
+  result.labels = std::move(labels);
+  return result;
+}
+
 void TriangleBins::begin(RasterMesh const& mesh, ScreenTransform const& transform, int width, int height,
                          Culling culling) {
   mesh_ = &mesh;

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mesh/triangle_mesh.h"
 #include "viewer/raster/raster_types.h"
 
 namespace scanview {
@@ -12,6 +13,9 @@ struct RasterMesh {
   std::vector<std::int32_t> corners;
   std::vector<std::uint32_t> labels;
 };
+
+/// `labels`: one a triangle.
+RasterMesh raster_mesh(TriangleMesh const& mesh, std::vector<std::uint32_t> labels);
 
 enum class Culling { back_faces, none };
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "viewer/raster/layer_rasterizer.h"
 #include "viewer/view_based/raster_view.h"
@@ -32,19 +31,11 @@ Composition composition(SoftZ const& soft_z, Camera const& camera) {
 class CpuRenderer final : public ViewBasedRenderer {
  public:
   CpuRenderer(std::shared_ptr<ViewLibrary> library, ViewBasedOptions const& options, int threads)
-      : ViewBasedRenderer(std::move(library), options), rasterizer_(threads) {
-    views_.resize(this->library().meshes().size());
-  }
+      : ViewBasedRenderer(library, options), rasterizer_(threads), views_(library) {}
   BackEnd back_end() const override { return BackEnd::cpu; }
 
  private:
-  bool ready(std::size_t view, bool wait) override {
-    if (views_[view]) return true;
-    cv::Mat3b const picture = wait ? library().picture(view) : library().picture_if_ready(view);
-    if (picture.empty()) return false;
-    views_[view].emplace(library().set().views[view], library().meshes()[view], picture);
-    return true;
-  }
+  bool ready(std::size_t view, bool wait) override { return views_.get(view, wait) != nullptr; }
 
   Frame draw(std::vector<UsedView> const& views, Camera const& camera,
              Eigen::Isometry3d const& object_from_camera) override {
@@ -67,7 +58,7 @@ class CpuRenderer final : public ViewBasedRenderer {
     std::vector<LayerRasterizer::Layer> layers;
     std::vector<ComposedLayer> composed;
     for (auto const& view : used) {
-      RasterView const& raster = *views_[view.view];
+      RasterView const& raster = *views_.get(view.view, true);
       LayerRasterizer::Layer layer;
       if (!raster.transform_to(camera, object_from_camera, layer.transform)) continue;
       layer.mesh = &raster.mesh();
@@ -120,14 +111,14 @@ class CpuRenderer final : public ViewBasedRenderer {
   }
 
   LayerRasterizer rasterizer_;
-  std::vector<std::optional<RasterView>> views_;
+  RasterViews views_;
 };
 
 }  // namespace
 
 std::unique_ptr<ViewBasedRenderer> make_cpu_renderer(std::shared_ptr<ViewLibrary> library,
                                                      ViewBasedOptions const& options, int threads) {
-  return std::make_unique<CpuRenderer>(std::move(library), options, threads);
+  return std::make_unique<CpuRenderer>(library, options, threads);
 }
 
 }  // namespace scanview

@@ -1,9 +1,13 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <memory>
+#include <optional>
+#include <vector>
 
 #include "acquire/scan_set.h"
 #include "mesh/view_mesh.h"
 #include "viewer/raster/triangle_bins.h"
+#include "viewer/view_based/view_library.h"
 
 namespace scanview {
 
@@ -27,6 +31,18 @@ class RasterView {
   cv::Rect area_;
   RasterMesh mesh_;
   RasterTexture texture_;
+};
+
+/// The views of a library as the rasteriser draws them, made when they are first asked for.
+class RasterViews {
+ public:
+  explicit RasterViews(std::shared_ptr<ViewLibrary> library);
+  /// Null where the picture failed or, unless `wait`, is not there yet.
+  RasterView const* get(std::size_t view, bool wait);
+
+ private:
+  std::shared_ptr<ViewLibrary> library_;
+  std::vector<std::optional<RasterView>> views_;
 };
 
 }  // namespace scanview

@@ -34,4 +34,19 @@ bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& cam
   return high > 0;
 }
 
+ScreenTransform screen_transform(Camera const& camera, Eigen::Isometry3d const& camera_from_source,
+                                 DepthRange const& range) {
+  auto picture = picture_from_camera(camera);
+  picture.topRows<2>() -= 0.5 * picture.row(2).replicate<2, 1>();  // from corners to centres
+  Eigen::Matrix<double, 3, 4> const rows = picture * camera_from_source.matrix();
+  ScreenTransform transform;
+  for (int c = 0; c < 4; ++c) {
+    for (int r = 0; r < 3; ++r) transform.rows[r][c] = rows(r, c);  // u, v, w
+    transform.rows[ScreenTransform::depth][c] = camera_from_source.matrix()(2, c);
+  }
+  transform.perspective = camera.is_perspective();
+  transform.near = range.near;
+  return transform;
+}
+
 }  // namespace scanview

@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 
 #include "calib/camera.h"
+#include "viewer/raster/raster_types.h"
 
 namespace scanview {
 
@@ -22,5 +23,9 @@ struct DepthRange {
 /// all of it is behind a perspective camera.
 bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& camera_from_source, bool perspective,
                  DepthRange& range);
+
+/// For the rasteriser: positions and depths of what a camera sees, without texture coordinates.
+ScreenTransform screen_transform(Camera const& camera, Eigen::Isometry3d const& camera_from_source,
+                                 DepthRange const& range);
 
 }  // namespace scanview

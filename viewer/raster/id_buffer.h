@@ -1,0 +1,24 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+
+#include "calib/camera.h"
+#include "mesh/triangle_mesh.h"
+#include "viewer/raster/triangle_bins.h"
+
+namespace scanview {
+
+inline constexpr std::int32_t kNoTriangle = -1;
+
+/// Which triangle of a mesh each pixel shows, and its depth (z in the camera; NaN where there is none).
+struct IdBuffer {
+  cv::Mat1i id;  ///< kNoTriangle where there is none
+  cv::Mat1f depth;
+};
+
+/// Draws a mesh whose vertices are in object coordinates. threads: at most so many; 0: all processors.
+IdBuffer draw_id_buffer(TriangleMesh const& mesh, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
+                        Culling culling = Culling::none, int threads = 0);
+
+}  // namespace scanview
