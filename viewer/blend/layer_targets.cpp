@@ -21,13 +21,9 @@ void LayerTargets::resize(int width, int height, int layers) {
     gl_.TexParameteri(target, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   };
   width_ = height_ = layers_ = 0;
-  color_ = GlTexture(gl_);
-  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, color_.name());
-  gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA16F, width, height, layers, 0, GL_RGBA, GL_FLOAT, nullptr);
-  nearest(GL_TEXTURE_2D_ARRAY);
-  depth_ = GlTexture(gl_);
-  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, depth_.name());
-  gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RG32F, width, height, layers, 0, GL_RG, GL_FLOAT, nullptr);
+  samples_ = GlTexture(gl_);
+  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, samples_.name());
+  gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA32F, width, height, layers, 0, GL_RGBA, GL_FLOAT, nullptr);
   nearest(GL_TEXTURE_2D_ARRAY);
   depth_buffer_ = GlTexture(gl_);
   gl_.BindTexture(GL_TEXTURE_2D, depth_buffer_.name());
@@ -44,17 +40,15 @@ void LayerTargets::resize(int width, int height, int layers) {
 
 void LayerTargets::begin_layer(int layer) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
-  gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, color_.name(), 0, layer);
-  gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, depth_.name(), 0, layer);
-  GLenum const buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-  gl_.DrawBuffers(2, buffers);
+  gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, samples_.name(), 0, layer);
+  GLenum const buffers[] = {GL_COLOR_ATTACHMENT0};
+  gl_.DrawBuffers(1, buffers);
   if (gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
     throw Error(ErrorCode::io, {}, "OpenGL cannot draw into float textures here");
   }
   gl_.Viewport(0, 0, width_, height_);
   float const nothing[] = {0, 0, 0, 0}, far_away[] = {1, 0, 0, 0};
   gl_.ClearBufferfv(GL_COLOR, 0, nothing);
-  gl_.ClearBufferfv(GL_COLOR, 1, nothing);
   gl_.ClearBufferfv(GL_DEPTH, 0, far_away);
 }
 

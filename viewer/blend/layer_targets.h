@@ -3,26 +3,25 @@
 
 namespace scanview {
 
-/// Where the views are drawn before they are composed: a layer a view of two float texture arrays, `color`
-/// (RGBA16F: linear light) and `depth` (RG32F: z in the rendering camera and the pixel weight, 0 where nothing was
-/// drawn; 16 bits would let the back ends disagree on which samples count). Row 0 is the top row of the picture. Layers
-/// share one depth buffer.
+/// Where the views are drawn before they are composed: a layer a view of a float texture array (RGBA32F): z in the
+/// rendering camera; quality w_cos · w_feather, 0 where nothing was drawn (16 bits would let the back ends disagree on
+/// which samples count); fairness; level of detail, -1 on a line of a wireframe. Row 0 is the top row of the picture.
+/// Layers share one depth buffer.
 class LayerTargets {
  public:
   explicit LayerTargets(GlFunctions const& gl);
   /// Makes room; keeps what is there where it is large enough and of the same size. Throws Error{bad_input} where the
   /// picture or the number of layers is more than OpenGL can do, Error{io} out of memory.
   void resize(int width, int height, int layers);
-  /// Binds a layer for drawing (colour at location 0, depth at location 1), its viewport, and clears it.
+  /// Binds a layer for drawing, its viewport, and clears it.
   void begin_layer(int layer);
-  GLuint color() const { return color_.name(); }
-  GLuint depth() const { return depth_.name(); }
+  GLuint samples() const { return samples_.name(); }
   int width() const { return width_; }
   int height() const { return height_; }
 
  private:
   GlFunctions const& gl_;
-  GlTexture color_, depth_, depth_buffer_;
+  GlTexture samples_, depth_buffer_;
   GlFramebuffer framebuffer_;
   int width_ = 0, height_ = 0, layers_ = 0;
 };

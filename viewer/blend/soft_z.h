@@ -4,37 +4,44 @@
 
 namespace scanview {
 
-/// What a whole layer (a view drawn from the eye) counts: in the mixture, and where the mixture has no good sample
-/// (UsedView). `hue`: its false colour, linear light.
+/// What a whole layer (a view drawn from the eye) counts: in the mixture, where the mixture has no good sample
+/// (UsedView), and where it is decided what hides what (fill_rank). `hue`: its false colour, linear light.
 struct LayerWeight {
   double weight = 0;
   double fill = 0;
+  double fill_rank = 0;
   Eigen::Vector3f hue{1, 1, 1};
 };
 
-/// Which of several views' samples of a pixel are seen, and how they are mixed (Pulli 1997, soft z-buffering). Two back
-/// ends compute it: SoftZCompositor on OpenGL, the bands of viewer/raster.
+/// Which of several views' samples of a pixel are seen, and how they are mixed (Pulli 1997, soft z-buffering, carried
+/// on). Two back ends compute it: SoftZCompositor on OpenGL, the tiles of viewer/raster.
 ///
-/// Sample i has depth z and weight w = (weight + s · fill) · q, with q the pixel's weight w_cos · w_feather. s is 1
-/// where the views with weight have no sample, and falls to 0 where sum(weight · min(1, 0.35 + q / 0.1)) reaches 0.3:
-/// views that fill leave no ghosts where they are not needed, fade in towards the rim of a hole, and never touch a view
-/// that has all the weight.
-///
-/// With hide(d) rising from 0 at d = threshold to 1 at d = 1.5 threshold:
-///   reliable(i) = 1 − max over j of hide(z_j − z_i) · low(w_i / (ratio · w_j)), low falling from 1 at ½ to 0 at 1:
-///                 a low-weight sample in front of a much heavier one further behind is ignored;
-///   visible(k)  = 1 − max over i of reliable(i) · hide(z_k − z_i): what lies behind a reliable sample is hidden;
-///   colour      = mean of all samples with weight w · reliable · visible.
-/// With all transitions hard this is the paper's "nearest reliable depth, and everything within the threshold of it";
+/// Sample i has depth z, quality q = w_cos · w_feather (at least kLeastQuality) and fairness f, rising from 0 at a
+/// feather of kFairFeather to 1 at twice that: the last fringe of a mesh hangs from the true outline. Its rank is
+/// r = (weight + fill_rank · f) · q. With hide(d) rising from 0 at d = threshold to 1 at d = 1.5 threshold:
+///   reliable(i) = 1 − max over j of hide(z_j − z_i) · low(r_i / (ratio · r_j)), low falling from 1 at ½ to 0 at 1:
+///                 a low-rank sample in front of a much higher one further behind is ignored;
+///   seen(k)     = reliable(k) · (1 − max over i of reliable(i) · hide(z_k − z_i)): what lies behind a reliable sample
+///                 is hidden.
+/// The views with weight fall short by
+///   need        = 1 − sum(weight · min(1, 0.35 + q / 0.1) · seen) / 0.3, between 0 and 1,
+/// where they have no sample, or only ones behind something that they do not see; there others fill:
+///   colour      = mean with shares (weight + need · f · fill) · q · seen.
+/// Views that fill leave no ghosts where they are not needed and fade in towards the rim of a hole. With all transitions
+/// hard and nothing that fills this is the paper's "nearest reliable depth, and everything within the threshold of it";
 /// with them nothing switches when the eye or a weight moves a little. The furthest sample is always reliable and the
-/// nearest reliable one always visible, so a pixel with a sample of positive weight gets a colour.
+/// nearest reliable one always seen, so a pixel with a sample of positive rank gets a colour.
+///
+/// Colours are taken where each view's picture shows the point at the mean depth: one surface, less noisy than each
+/// view's own, instead of as many as there are views.
 struct SoftZ {
   static constexpr int kMaxLayers = 24;
   static constexpr double kGoodEnough = 0.3;      ///< where the main views' goodness reaches it, nothing fills
   static constexpr double kGoodAtZero = 0.35;     ///< goodness of a sample with q = 0
   static constexpr double kGoodQuality = 0.1;     ///< q that adds 1 to it
-  static constexpr double kFairQuality = 0.03;    ///< what only fills counts from this q on, fully from twice as much:
-                                                  ///< the last fringe of a mesh hangs from the true outline
+  static constexpr double kFairFeather = 0.03;    ///< what only fills counts from this feather on, fully from twice as
+                                                  ///< much: the last fringe of a mesh hangs from the true outline
+  static constexpr double kLeastQuality = 1e-4;   ///< a view that is alone at its border still shows
   double threshold = 0;                           ///< >= 0, may be infinite
   double reliability_ratio = 0.1;
   bool nearest = false;  ///< the nearest sample alone, whatever its weight

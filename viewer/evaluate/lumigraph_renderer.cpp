@@ -60,21 +60,20 @@ class LumigraphRenderer final : public HeldOutRenderer {
     Composition how;
     how.threshold = 1e30F;
     how.ramp = 1e-30F;
-    how.good_enough = how.good_quality = how.fair_quality = 1;
-    how.least_weight = kLeastPixelWeight;
+    how.good_enough = how.good_quality = how.fair_feather = 1;
+    how.least_weight = static_cast<float>(SoftZ::kLeastQuality);
     how.perspective = camera.is_perspective();
     rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
       auto of_tile = composed;
-      float* const unused = tile.scratch(0);
       for (std::size_t i = 0; i < of_tile.size(); ++i) {
         of_tile[i].samples = tile.draw(i);
-        of_tile[i].quality = tile.scratch(1 + i);
-        measure_quality(of_tile[i], how, tile.area, unused);
+        of_tile[i].quality = tile.scratch(2 * i);
+        of_tile[i].fairness = tile.scratch(2 * i + 1);
+        measure_quality(of_tile[i], how, tile.area);
       }
       weigh(camera, sources, tile.area, of_tile);
-      std::fill_n(unused, LayerRasterizer::kTilePixels, 0.0F);
       auto* const pixels = reinterpret_cast<std::uint32_t*>(frame.color.ptr(tile.area.top)) + tile.area.left;
-      compose_layers(of_tile.data(), of_tile.size(), how, tile.area, unused, pixels, frame.color.step1() / 4,
+      compose_layers(of_tile.data(), of_tile.size(), how, tile.area, pixels, frame.color.step1() / 4,
                      frame.depth.ptr<float>(tile.area.top) + tile.area.left, frame.depth.step1());
     });
     return frame;

@@ -16,6 +16,7 @@ namespace scanview {
   X(GLFRONTFACE, FrontFace)                             \
   X(GLDEPTHFUNC, DepthFunc)                             \
   X(GLVIEWPORT, Viewport)                               \
+  X(GLBLENDFUNC, BlendFunc)                             \
   X(GLPOLYGONMODE, PolygonMode)                         \
   X(GLCLEARBUFFERFV, ClearBufferfv)                     \
   X(GLPIXELSTOREI, PixelStorei)                         \
@@ -68,6 +69,7 @@ namespace scanview {
   X(GLUNIFORM2F, Uniform2f)                             \
   X(GLUNIFORM3F, Uniform3f)                             \
   X(GLUNIFORM3FV, Uniform3fv)                           \
+  X(GLUNIFORMMATRIX3FV, UniformMatrix3fv)               \
   X(GLUNIFORMMATRIX4FV, UniformMatrix4fv)
 
 /// Our own loader: epoxy and GLEW do not work on OSMesa. One object a context; plain function pointers.

@@ -44,7 +44,7 @@ HWY_INLINE Taps TapsAt(V s, V t, float scale_s, float scale_t, int width, int he
   return {hn::ConvertTo(di, left), hn::ConvertTo(di, top), hn::Sub(x, left), hn::Sub(y, top)};
 }
 
-void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea const& area, float* good) {
+void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea const& area) {
   Floats const d;
   Ints const di;
   Words const du;
@@ -61,6 +61,7 @@ void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea
       auto const drawn = hn::And(hn::Gt(key, hn::Set(d, -FLT_MAX)), hn::Lt(key, hn::Set(d, FLT_MAX)));
       if (hn::AllFalse(d, drawn)) {
         hn::StoreU(hn::Zero(d), d, layer.quality + at);
+        hn::StoreU(hn::Zero(d), d, layer.fairness + at);
         continue;
       }
       auto quality = hn::Set(d, 1.0F);
@@ -68,46 +69,23 @@ void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea
         auto const cosine = hn::ShiftRight<16>(hn::LoadU(du, layer.samples.packed + at));
         quality = hn::Mul(hn::ConvertTo(d, hn::BitCast(di, cosine)), hn::Set(d, 1.0F / 65535));
       }
-      if (layer.feather) {
-        auto const s = hn::IfThenElseZero(drawn, hn::LoadU(d, layer.samples.s + at));
-        auto const t = hn::IfThenElseZero(drawn, hn::LoadU(d, layer.samples.t + at));
-        Taps const taps = TapsAt(s, t, 1, 1, level.width, level.height);
-        auto const index = hn::Add(hn::Mul(taps.y, hn::Set(di, level.width)), taps.x);
-        auto const word = hn::GatherIndex(du, layer.texture->feather.data(), index);
-        auto const mix = [&](V a, V b, V share) HWY_ATTR { return hn::Add(a, hn::Mul(share, hn::Sub(b, a))); };
-        auto const upper = mix(byte(word, std::integral_constant<int, 0>()), byte(word, std::integral_constant<int, 8>()),
-                               taps.right);
-        auto const lower = mix(byte(word, std::integral_constant<int, 16>()),
-                               byte(word, std::integral_constant<int, 24>()), taps.right);
-        quality = hn::Mul(quality, hn::Mul(mix(upper, lower, taps.down), hn::Set(d, 1.0F / 255)));
-      }
-      quality = hn::IfThenElseZero(drawn, Clamp(quality, how.least_weight, 1.0F));
-      hn::StoreU(quality, d, layer.quality + at);
-      if (layer.weight > 0) {
-        auto const goodness = hn::Min(
-            hn::Set(d, 1.0F),
-            hn::Add(hn::Set(d, how.good_at_zero), hn::Mul(quality, hn::Set(d, 1.0F / how.good_quality))));
-        auto const share = hn::IfThenElseZero(drawn, hn::Mul(hn::Set(d, layer.weight), goodness));
-        hn::StoreU(hn::Add(hn::LoadU(d, good + at), share), d, good + at);
-      }
+      auto const s = hn::IfThenElseZero(drawn, hn::LoadU(d, layer.samples.s + at));
+      auto const t = hn::IfThenElseZero(drawn, hn::LoadU(d, layer.samples.t + at));
+      Taps const taps = TapsAt(s, t, 1, 1, level.width, level.height);
+      auto const index = hn::Add(hn::Mul(taps.y, hn::Set(di, level.width)), taps.x);
+      auto const word = hn::GatherIndex(du, layer.texture->feather.data(), index);
+      auto const mix = [&](V a, V b, V share) HWY_ATTR { return hn::Add(a, hn::Mul(share, hn::Sub(b, a))); };
+      auto const upper =
+          mix(byte(word, std::integral_constant<int, 0>()), byte(word, std::integral_constant<int, 8>()), taps.right);
+      auto const lower =
+          mix(byte(word, std::integral_constant<int, 16>()), byte(word, std::integral_constant<int, 24>()), taps.right);
+      auto const feather = hn::Mul(mix(upper, lower, taps.down), hn::Set(d, 1.0F / 255));
+      if (layer.feather) quality = hn::Mul(quality, feather);
+      hn::StoreU(hn::IfThenElseZero(drawn, Clamp(quality, how.least_weight, 1.0F)), d, layer.quality + at);
+      auto const fairness = hn::Sub(hn::Mul(feather, hn::Set(d, 1.0F / how.fair_feather)), hn::Set(d, 1.0F));
+      hn::StoreU(hn::IfThenElseZero(drawn, Clamp(fairness, 0.0F, 1.0F)), d, layer.fairness + at);
     }
   }
-}
-
-bool MeasureNeed(Composition const& how, TileArea const& area, float* good) {
-  Floats const d;
-  std::size_t const lanes = hn::Lanes(d);
-  auto any = hn::Zero(d);
-  for (int y = 0; y < area.bottom - area.top; ++y) {
-    for (std::size_t x = 0; x < static_cast<std::size_t>(area.right - area.left); x += lanes) {
-      float* const at = good + static_cast<std::size_t>(y * kTileStride) + x;
-      auto const need = Clamp(
-          hn::Sub(hn::Set(d, 1.0F), hn::Mul(hn::LoadU(d, at), hn::Set(d, 1.0F / how.good_enough))), 0.0F, 1.0F);
-      hn::StoreU(need, d, at);
-      any = hn::Max(any, need);
-    }
-  }
-  return !hn::AllFalse(d, hn::Gt(any, hn::Zero(d)));
 }
 
 struct Color {
@@ -151,12 +129,12 @@ HWY_INLINE Color SampleLevel(RasterTexture const& texture, std::size_t index, V 
 }
 
 /// Linear light of a layer's samples, trilinear; lanes without a sample give anything finite.
-HWY_INLINE Color SampleLayer(ComposedLayer const& layer, std::size_t at, hn::Mask<Floats> wanted) {
+HWY_INLINE Color SampleLayer(ComposedLayer const& layer, std::size_t at, hn::Mask<Floats> wanted, V s, V t) {
   Floats const d;
   Ints const di;
   Words const du;
-  auto const s = hn::IfThenElseZero(wanted, hn::LoadU(d, layer.samples.s + at));
-  auto const t = hn::IfThenElseZero(wanted, hn::LoadU(d, layer.samples.t + at));
+  s = hn::IfThenElseZero(wanted, s);
+  t = hn::IfThenElseZero(wanted, t);
   auto const packed = hn::IfThenElseZero(hn::RebindMask(du, wanted), hn::LoadU(du, layer.samples.packed + at));
   auto const lod_bits = hn::And(packed, hn::Set(du, 32767));
   Color sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
@@ -195,73 +173,106 @@ HWY_INLINE Color SampleLayer(ComposedLayer const& layer, std::size_t at, hn::Mas
   return sum;
 }
 
-/// The samples of one group of pixels that count: compact, so that most groups cost as many layers as they have.
+/// The samples of one group of pixels: compact, so that most groups cost as many layers as they have.
 struct Group {
   std::size_t count = 0;
   std::size_t layer[kMostLayers];
-  HWY_ALIGN float weight[kMostLayers][kMostLanes];
+  HWY_ALIGN float quality[kMostLayers][kMostLanes];
+  HWY_ALIGN float fair_fill[kMostLayers][kMostLanes];  ///< the layer's fill times the sample's fairness
+  HWY_ALIGN float rank[kMostLayers][kMostLanes];       ///< its weight where it is decided what hides what
   HWY_ALIGN float depth[kMostLayers][kMostLanes];
   HWY_ALIGN float reliable[kMostLayers][kMostLanes];
+  HWY_ALIGN float seen[kMostLayers][kMostLanes];
   HWY_ALIGN float share[kMostLayers][kMostLanes];
+  V spread;  ///< between the nearest and the furthest sample
 };
 
-HWY_INLINE void GatherGroup(ComposedLayer const* layers, std::size_t count, Composition const& how, V need,
-                            std::size_t at, Group& group) {
+HWY_INLINE void GatherGroup(ComposedLayer const* layers, std::size_t count, Composition const& how, std::size_t at,
+                            Group& group) {
   Floats const d;
   auto const one = hn::Set(d, 1.0F);
+  auto nearest = hn::Set(d, FLT_MAX), furthest = hn::Set(d, -FLT_MAX);
   group.count = 0;
   for (std::size_t i = 0; i < count; ++i) {
     auto const quality = hn::LoadU(d, layers[i].quality + at);
     if (hn::AllFalse(d, hn::Gt(quality, hn::Zero(d)))) continue;
-    auto const fair =
-        Clamp(hn::Sub(hn::Mul(quality, hn::Set(d, 1.0F / how.fair_quality)), one), 0.0F, 1.0F);
-    auto const extra = hn::Mul(hn::Mul(need, fair), hn::Set(d, layers[i].fill));
-    auto const weight = hn::Mul(hn::Add(hn::Set(d, layers[i].weight), extra), quality);
-    auto const counts = hn::Gt(weight, hn::Zero(d));
+    auto const fairness = hn::LoadU(d, layers[i].fairness + at);
+    auto const weight = hn::Set(d, layers[i].weight);
+    auto const rank = hn::Mul(hn::Add(weight, hn::Mul(fairness, hn::Set(d, layers[i].fill_rank))), quality);
+    auto const counts = hn::Gt(rank, hn::Zero(d));
     if (hn::AllFalse(d, counts)) continue;
     auto const key = hn::LoadU(d, layers[i].samples.key + at);
     auto const depth = how.perspective ? hn::Div(one, key) : hn::Neg(key);
-    group.layer[group.count] = i;
-    hn::Store(weight, d, group.weight[group.count]);
-    hn::Store(hn::IfThenElseZero(counts, depth), d, group.depth[group.count]);
-    ++group.count;
+    nearest = hn::IfThenElse(counts, hn::Min(nearest, depth), nearest);
+    furthest = hn::IfThenElse(counts, hn::Max(furthest, depth), furthest);
+    std::size_t const k = group.count++;
+    group.layer[k] = i;
+    hn::Store(hn::IfThenElseZero(counts, quality), d, group.quality[k]);
+    hn::Store(hn::Mul(fairness, hn::Set(d, layers[i].fill)), d, group.fair_fill[k]);
+    hn::Store(rank, d, group.rank[k]);
+    hn::Store(hn::IfThenElseZero(counts, depth), d, group.depth[k]);
   }
+  group.spread = hn::Sub(furthest, nearest);
 }
 
-HWY_INLINE void SoftZShares(Composition const& how, Group& group) {
+/// How far each sample is reliable and not hidden.
+HWY_INLINE void SoftZSeen(Composition const& how, Group& group) {
   Floats const d;
   auto const one = hn::Set(d, 1.0F);
-  if (group.count == 1) {
-    hn::Store(hn::Load(d, group.weight[0]), d, group.share[0]);
+  // Most pixels show one surface.
+  if (hn::AllFalse(d, hn::Gt(group.spread, hn::Set(d, how.threshold)))) {
+    for (std::size_t k = 0; k < group.count; ++k) hn::Store(one, d, group.seen[k]);
     return;
   }
   auto const hide = [&](V distance) HWY_ATTR {
     return Clamp(hn::Mul(hn::Sub(distance, hn::Set(d, how.threshold)), hn::Set(d, how.ramp)), 0.0F, 1.0F);
   };
   for (std::size_t i = 0; i < group.count; ++i) {
-    auto const weight = hn::Load(d, group.weight[i]), depth = hn::Load(d, group.depth[i]);
+    auto const rank = hn::Load(d, group.rank[i]), depth = hn::Load(d, group.depth[i]);
     auto doubt = hn::Zero(d);
     for (std::size_t j = 0; j < group.count; ++j) {
-      if (j == i) continue;
       auto const hidden = hide(hn::Sub(hn::Load(d, group.depth[j]), depth));
       if (hn::AllFalse(d, hn::Gt(hidden, hn::Zero(d)))) continue;
-      auto const other = hn::Add(hn::Mul(hn::Set(d, how.reliability_ratio), hn::Load(d, group.weight[j])),
-                                 hn::Set(d, 1e-30F));
-      auto const ratio = hn::Div(weight, other);
-      auto const low = Clamp(hn::Sub(hn::Set(d, 2.0F), hn::Mul(hn::Set(d, 2.0F), ratio)), 0.0F, 1.0F);
-      doubt = hn::Max(doubt, hn::Mul(hidden, low));
+      auto const other =
+          hn::Add(hn::Mul(hn::Set(d, how.reliability_ratio), hn::Load(d, group.rank[j])), hn::Set(d, 1e-30F));
+      auto const low = Clamp(hn::Sub(hn::Set(d, 2.0F), hn::Mul(hn::Set(d, 2.0F), hn::Div(rank, other))), 0.0F, 1.0F);
+      auto const there = hn::Gt(hn::Load(d, group.rank[j]), hn::Zero(d));
+      doubt = hn::Max(doubt, hn::IfThenElseZero(there, hn::Mul(hidden, low)));
     }
-    hn::Store(hn::IfThenElseZero(hn::Gt(weight, hn::Zero(d)), hn::Sub(one, doubt)), d, group.reliable[i]);
+    hn::Store(hn::IfThenElseZero(hn::Gt(rank, hn::Zero(d)), hn::Sub(one, doubt)), d, group.reliable[i]);
   }
   for (std::size_t k = 0; k < group.count; ++k) {
     auto const depth = hn::Load(d, group.depth[k]);
     auto hidden = hn::Zero(d);
     for (std::size_t i = 0; i < group.count; ++i) {
-      if (i == k) continue;
-      hidden = hn::Max(hidden, hn::Mul(hn::Load(d, group.reliable[i]), hide(hn::Sub(depth, hn::Load(d, group.depth[i])))));
+      auto const behind = hide(hn::Sub(depth, hn::Load(d, group.depth[i])));
+      hidden = hn::Max(hidden, hn::Mul(hn::Load(d, group.reliable[i]), behind));
     }
-    hn::Store(hn::Mul(hn::Mul(hn::Load(d, group.weight[k]), hn::Load(d, group.reliable[k])), hn::Sub(one, hidden)), d,
-              group.share[k]);
+    hn::Store(hn::Mul(hn::Load(d, group.reliable[k]), hn::Sub(one, hidden)), d, group.seen[k]);
+  }
+}
+
+/// Shares in the colour: of the views with weight, and as far as these are not good enough, of those that fill.
+HWY_INLINE void SoftZShares(ComposedLayer const* layers, Composition const& how, Group& group) {
+  Floats const d;
+  auto const one = hn::Set(d, 1.0F);
+  SoftZSeen(how, group);
+  auto good = hn::Zero(d);
+  for (std::size_t k = 0; k < group.count; ++k) {
+    float const weight = layers[group.layer[k]].weight;
+    if (!(weight > 0)) continue;
+    auto const quality = hn::Load(d, group.quality[k]);
+    auto const goodness = hn::Min(
+        one, hn::Add(hn::Set(d, how.good_at_zero), hn::Mul(quality, hn::Set(d, 1.0F / how.good_quality))));
+    auto const there = hn::Gt(quality, hn::Zero(d));
+    auto const part = hn::Mul(hn::Mul(hn::Set(d, weight), goodness), hn::Load(d, group.seen[k]));
+    good = hn::Add(good, hn::IfThenElseZero(there, part));
+  }
+  auto const need = Clamp(hn::Sub(one, hn::Mul(good, hn::Set(d, 1.0F / how.good_enough))), 0.0F, 1.0F);
+  for (std::size_t k = 0; k < group.count; ++k) {
+    auto const weight =
+        hn::Add(hn::Set(d, layers[group.layer[k]].weight), hn::Mul(need, hn::Load(d, group.fair_fill[k])));
+    hn::Store(hn::Mul(hn::Mul(weight, hn::Load(d, group.quality[k])), hn::Load(d, group.seen[k])), d, group.share[k]);
   }
 }
 
@@ -269,12 +280,12 @@ HWY_INLINE void NearestShares(Group& group) {
   Floats const d;
   for (std::size_t k = 0; k < group.count; ++k) {
     auto const depth = hn::Load(d, group.depth[k]);
-    auto wins = hn::Gt(hn::Load(d, group.weight[k]), hn::Zero(d));
+    auto wins = hn::Gt(hn::Load(d, group.rank[k]), hn::Zero(d));
     for (std::size_t i = 0; i < group.count; ++i) {
       if (i == k) continue;
       auto const other = hn::Load(d, group.depth[i]);
       auto const before = i < k ? hn::Le(other, depth) : hn::Lt(other, depth);
-      wins = hn::AndNot(hn::And(before, hn::Gt(hn::Load(d, group.weight[i]), hn::Zero(d))), wins);
+      wins = hn::AndNot(hn::And(before, hn::Gt(hn::Load(d, group.rank[i]), hn::Zero(d))), wins);
     }
     hn::Store(hn::IfThenElseZero(wins, hn::Set(d, 1.0F)), d, group.share[k]);
   }
@@ -303,8 +314,7 @@ HWY_INLINE hn::Vec<Words> Encode(V linear) {
 }
 
 void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition const& how, TileArea const& area,
-                   float const* need, std::uint32_t* color, std::size_t color_stride, float* depth,
-                   std::size_t depth_stride) {
+                   std::uint32_t* color, std::size_t color_stride, float* depth, std::size_t depth_stride) {
   Floats const d;
   Words const du;
   std::size_t const lanes = hn::Lanes(d);
@@ -315,39 +325,57 @@ void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition c
   for (std::size_t y = 0; y < static_cast<std::size_t>(area.bottom - area.top); ++y) {
     for (std::size_t x = 0; x < columns; x += lanes) {
       std::size_t const at = y * kTileStride + x;
-      GatherGroup(layers, count, how, hn::LoadU(d, need + at), at, group);
+      GatherGroup(layers, count, how, at, group);
       auto bgra = hn::Zero(du);
       auto z = hn::Set(d, std::numeric_limits<float>::quiet_NaN());
       if (group.count > 0) {
         if (how.nearest) {
           NearestShares(group);
         } else {
-          SoftZShares(how, group);
+          SoftZShares(layers, how, group);
         }
         if (how.show == 2) OnlyWinner(group);
         Color sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         auto total = hn::Zero(d), sum_z = hn::Zero(d);
         for (std::size_t k = 0; k < group.count; ++k) {
           auto const share = hn::Load(d, group.share[k]);
-          auto const counts = hn::Gt(share, hn::Zero(d));
-          if (hn::AllFalse(d, counts)) continue;
-          ComposedLayer const& layer = layers[group.layer[k]];
-          Color const c = how.show == 0
-                              ? SampleLayer(layer, at, counts)
-                              : Color{hn::Set(d, layer.hue[0]), hn::Set(d, layer.hue[1]), hn::Set(d, layer.hue[2])};
-          sum.r = hn::Add(sum.r, hn::Mul(share, c.r));
-          sum.g = hn::Add(sum.g, hn::Mul(share, c.g));
-          sum.b = hn::Add(sum.b, hn::Mul(share, c.b));
           sum_z = hn::Add(sum_z, hn::Mul(share, hn::Load(d, group.depth[k])));
           total = hn::Add(total, share);
         }
         auto const any = hn::Gt(total, hn::Zero(d));
         auto const inverse = hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(any, total, hn::Set(d, 1.0F)));
+        auto const mean_z = hn::Mul(sum_z, inverse);
+        auto const px = hn::Add(hn::Iota(d, 0), hn::Set(d, static_cast<float>(area.left) + static_cast<float>(x)));
+        float const py = static_cast<float>(area.top) + static_cast<float>(y);
+        for (std::size_t k = 0; k < group.count; ++k) {
+          auto const share = hn::Load(d, group.share[k]);
+          auto const counts = hn::Gt(share, hn::Zero(d));
+          if (hn::AllFalse(d, counts)) continue;
+          ComposedLayer const& layer = layers[group.layer[k]];
+          auto s = hn::LoadU(d, layer.samples.s + at), t = hn::LoadU(d, layer.samples.t + at);
+          if (how.agree && group.count > 1) {
+            auto const row = [&](int r) HWY_ATTR {
+              auto const linear = [&](float const* m) HWY_ATTR {
+                return hn::Add(hn::Mul(hn::Set(d, m[0]), px), hn::Set(d, m[1] * py + m[2]));
+              };
+              return hn::Add(hn::Mul(mean_z, linear(layer.along[r])), linear(layer.at[r]));
+            };
+            auto const inverse_w = hn::Div(hn::Set(d, 1.0F), row(2));
+            s = hn::Mul(row(0), inverse_w);
+            t = hn::Mul(row(1), inverse_w);
+          }
+          Color const c = how.show == 0
+                              ? SampleLayer(layer, at, counts, s, t)
+                              : Color{hn::Set(d, layer.hue[0]), hn::Set(d, layer.hue[1]), hn::Set(d, layer.hue[2])};
+          sum.r = hn::Add(sum.r, hn::Mul(share, c.r));
+          sum.g = hn::Add(sum.g, hn::Mul(share, c.g));
+          sum.b = hn::Add(sum.b, hn::Mul(share, c.b));
+        }
         auto const r = Encode(hn::Mul(sum.r, inverse)), g = Encode(hn::Mul(sum.g, inverse)),
                    b = Encode(hn::Mul(sum.b, inverse));
         auto const opaque = hn::Or(hn::Or(b, hn::ShiftLeft<8>(g)), hn::Or(hn::ShiftLeft<16>(r), hn::Set(du, 0xff000000U)));
         bgra = hn::IfThenElseZero(hn::RebindMask(du, any), opaque);
-        z = hn::IfThenElse(any, hn::Mul(sum_z, inverse), z);
+        z = hn::IfThenElse(any, mean_z, z);
       }
       std::uint32_t* const to = color + y * color_stride + x;
       float* const to_depth = depth + y * depth_stride + x;
@@ -372,21 +400,15 @@ HWY_AFTER_NAMESPACE();
 namespace scanview {
 
 HWY_EXPORT(MeasureQuality);
-HWY_EXPORT(MeasureNeed);
 HWY_EXPORT(ComposeLayers);
 
-void measure_quality(ComposedLayer const& layer, Composition const& how, TileArea const& area, float* good) {
-  HWY_DYNAMIC_DISPATCH(MeasureQuality)(layer, how, area, good);
-}
-
-bool measure_need(Composition const& how, TileArea const& area, float* good) {
-  return HWY_DYNAMIC_DISPATCH(MeasureNeed)(how, area, good);
+void measure_quality(ComposedLayer const& layer, Composition const& how, TileArea const& area) {
+  HWY_DYNAMIC_DISPATCH(MeasureQuality)(layer, how, area);
 }
 
 void compose_layers(ComposedLayer const* layers, std::size_t count, Composition const& how, TileArea const& area,
-                    float const* need, std::uint32_t* color, std::size_t color_stride, float* depth,
-                    std::size_t depth_stride) {
-  HWY_DYNAMIC_DISPATCH(ComposeLayers)(layers, count, how, area, need, color, color_stride, depth, depth_stride);
+                    std::uint32_t* color, std::size_t color_stride, float* depth, std::size_t depth_stride) {
+  HWY_DYNAMIC_DISPATCH(ComposeLayers)(layers, count, how, area, color, color_stride, depth, depth_stride);
 }
 
 }  // namespace scanview

@@ -20,30 +20,33 @@ void draw_ids(ScreenTriangle const* triangles, std::size_t count, TileArea const
 struct ComposedLayer {
   TextureTarget samples;
   RasterTexture const* texture = nullptr;
-  float* quality = nullptr;  ///< scratch: w_cos · w_feather of each sample
+  float* quality = nullptr;  ///< scratch: w_cos · w_feather of each sample, 0 where there is none
+  float* fairness = nullptr; ///< scratch: how far the sample counts where its view only fills
   float gain[3] = {1, 1, 1};  ///< R, G, B
   float hue[3] = {1, 1, 1};
   float weight = 0, fill = 0;
+  float fill_rank = 0;  ///< `fill` where it is decided what hides what
   bool cosine = true, feather = true;  ///< whether they count in the weight
+  /// Texel (s w, t w, w) of the point that pixel (x, y) of the picture shows at depth z:
+  /// z · along (x, y, 1) + at (x, y, 1).
+  float along[3][3] = {}, at[3][3] = {};
 };
 /// How layers are mixed: SoftZ, as single precision with finite numbers.
 struct Composition {
   float threshold = 0, ramp = 0;  ///< ramp: 1 / (half a threshold)
   float reliability_ratio = 0.1F;
-  float good_enough = 0, good_at_zero = 0, good_quality = 0, fair_quality = 0, least_weight = 0;
+  float good_enough = 0, good_at_zero = 0, good_quality = 0, fair_feather = 0, least_weight = 0;
   bool nearest = false;
+  bool agree = false;  ///< samples are taken where the mean depth lies, instead of on each layer's own surface
   int show = 0;
   bool perspective = true;
 };
-/// Quality of the layer's samples, and added to `good` weight · min(1, good_at_zero + quality / good_quality).
-void measure_quality(ComposedLayer const& layer, Composition const& how, TileArea const& area, float* good);
-/// Turns `good` into how much fill is needed, 0 to 1; returns whether any pixel needs some.
-bool measure_need(Composition const& how, TileArea const& area, float* good);
+/// Quality and fairness of the layer's samples.
+void measure_quality(ComposedLayer const& layer, Composition const& how, TileArea const& area);
 /// Mixes layers into the picture: BGRA bytes and depth, rows `color_stride` and `depth_stride` elements apart, starting
 /// at the tile's first pixel.
 void compose_layers(ComposedLayer const* layers, std::size_t count, Composition const& how, TileArea const& area,
-                    float const* need, std::uint32_t* color, std::size_t color_stride, float* depth,
-                    std::size_t depth_stride);
+                    std::uint32_t* color, std::size_t color_stride, float* depth, std::size_t depth_stride);
 
 /// The instruction sets this processor can run, by name, and a way to allow only one of them (tests): "" for all.
 std::vector<char const*> kernel_targets();

@@ -45,4 +45,10 @@ std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main, std::v
   return all;
 }
 
+double fill_rank(std::vector<UsedView> const& views) {
+  double greatest = 0;
+  for (auto const& view : views) greatest = std::max(greatest, view.weight);
+  return std::clamp(3 * (1 - greatest), 1e-3, 1.0);
+}
+
 }  // namespace scanview

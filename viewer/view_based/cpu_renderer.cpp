@@ -20,8 +20,9 @@ Composition composition(SoftZ const& soft_z, Camera const& camera) {
   how.good_enough = static_cast<float>(SoftZ::kGoodEnough);
   how.good_at_zero = static_cast<float>(SoftZ::kGoodAtZero);
   how.good_quality = static_cast<float>(SoftZ::kGoodQuality);
-  how.fair_quality = static_cast<float>(SoftZ::kFairQuality);
-  how.least_weight = kLeastPixelWeight;
+  how.fair_feather = static_cast<float>(SoftZ::kFairFeather);
+  how.agree = true;
+  how.least_weight = static_cast<float>(SoftZ::kLeastQuality);
   how.nearest = soft_z.nearest;
   how.show = static_cast<int>(soft_z.show);
   how.perspective = camera.is_perspective();
@@ -57,6 +58,7 @@ class CpuRenderer final : public ViewBasedRenderer {
                   cv::Mat4b color, cv::Mat1f depth) {
     std::vector<LayerRasterizer::Layer> layers;
     std::vector<ComposedLayer> composed;
+    double const rank = fill_rank(used);
     for (auto const& view : used) {
       RasterView const& raster = *views_.get(view.view, true);
       LayerRasterizer::Layer layer;
@@ -72,8 +74,16 @@ class CpuRenderer final : public ViewBasedRenderer {
         compose.gain[c] = raster.gain()[c];
         compose.hue[c] = hue[c];
       }
+      PicturePlace const place = raster.place(camera, object_from_camera);
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) {
+          compose.along[r][c] = place.along(r, c);
+          compose.at[r][c] = place.at(r, c);
+        }
+      }
       compose.weight = static_cast<float>(view.weight);
       compose.fill = static_cast<float>(view.fill);
+      compose.fill_rank = static_cast<float>(view.fill * rank);
       compose.cosine = options().cosine;
       compose.feather = options().feather;
       composed.push_back(compose);
@@ -81,29 +91,14 @@ class CpuRenderer final : public ViewBasedRenderer {
     Composition const how = composition(soft_z(), camera);
     rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
       auto of_tile = composed;
-      float* const need = tile.scratch(0);
-      std::fill_n(need, LayerRasterizer::kTilePixels, 0.0F);
-      auto const draw_layer = [&](std::size_t i, float const* where) {
-        of_tile[i].samples = tile.draw(i, where);
-        of_tile[i].quality = tile.scratch(1 + i);
-        measure_quality(of_tile[i], how, tile.area, need);
-      };
       for (std::size_t i = 0; i < of_tile.size(); ++i) {
-        if (of_tile[i].weight > 0) draw_layer(i, nullptr);
-      }
-      // Views that only fill are drawn where something is to be filled, and nowhere else.
-      std::size_t drawn = of_tile.size();
-      if (measure_need(how, tile.area, need)) {
-        for (std::size_t i = 0; i < of_tile.size(); ++i) {
-          if (!(of_tile[i].weight > 0)) draw_layer(i, need);
-        }
-      } else {
-        auto const end = std::stable_partition(of_tile.begin(), of_tile.end(),
-                                               [](ComposedLayer const& layer) { return layer.weight > 0; });
-        drawn = static_cast<std::size_t>(end - of_tile.begin());
+        of_tile[i].samples = tile.draw(i);
+        of_tile[i].quality = tile.scratch(2 * i);
+        of_tile[i].fairness = tile.scratch(2 * i + 1);
+        measure_quality(of_tile[i], how, tile.area);
       }
       auto* const pixels = reinterpret_cast<std::uint32_t*>(color.ptr(tile.area.top)) + tile.area.left;
-      compose_layers(of_tile.data(), drawn, how, tile.area, need, pixels, color.step1() / 4,
+      compose_layers(of_tile.data(), of_tile.size(), how, tile.area, pixels, color.step1() / 4,
                      depth.ptr<float>(tile.area.top) + tile.area.left, depth.step1());
     });
     stages_["triangles"] += rasterizer_.prepare_ms();

@@ -60,15 +60,17 @@ class GlRenderer final : public ViewBasedRenderer {
     }
     gpu_->targets.resize(camera.width(), camera.height(), std::max<int>(1, static_cast<int>(drawn.size())));
     std::vector<LayerWeight> weights;
+    std::vector<LayerPicture> pictures;
+    double const rank = fill_rank(views);
     for (auto const& view : drawn) {
-      ViewPass::Look look{options().cosine, options().feather, {}};
-      if (options().wireframe) look.wireframe = view_hue(view.view);
+      GpuView const& gpu = *gpu_->views[view.view];
       gpu_->targets.begin_layer(static_cast<int>(weights.size()));
-      gpu_->pass.draw(*gpu_->views[view.view], camera, object_from_camera, look);
-      weights.push_back({view.weight, view.fill, view_hue(view.view)});
+      gpu_->pass.draw(gpu, camera, object_from_camera, {options().cosine, options().feather, options().wireframe});
+      weights.push_back({view.weight, view.fill, rank * view.fill, view_hue(view.view)});
+      gpu.place(camera, object_from_camera, pictures.emplace_back());
     }
     // OpenGL works asynchronously: only the whole can be timed.
-    Frame frame = gpu_->compositor.compose(gpu_->targets, weights, soft_z());
+    Frame frame = gpu_->compositor.compose(gpu_->targets, weights, pictures, soft_z());
     std::chrono::duration<double, std::milli> const took = std::chrono::steady_clock::now() - start;
     stages_ = {{"frame", took.count()}};
     return frame;

@@ -8,6 +8,7 @@
 #include "mesh/view_mesh.h"
 #include "viewer/raster/triangle_bins.h"
 #include "viewer/view_based/view_library.h"
+#include "viewer/view_based/view_transform.h"
 
 namespace scanview {
 
@@ -22,6 +23,9 @@ class RasterView {
   /// False where all of the view lies behind the camera.
   bool transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera,
                     ScreenTransform& transform) const;
+  PicturePlace place(Camera const& camera, Eigen::Isometry3d const& object_from_camera) const {
+    return picture_place(camera_, area_, object_from_camera_.inverse() * object_from_camera, camera);
+  }
 
  private:
   Camera camera_;

@@ -28,16 +28,14 @@ void main() {
 
 constexpr char kFragmentShader[] = R"(#version 330 core
 in vec4 texture_and_depth;
-uniform sampler2D picture;
 uniform sampler2D feather;
 uniform samplerBuffer cos_phi;
-uniform vec3 gain;
-uniform float least_weight;
 uniform vec2 size;                 // of the picture
+uniform float least_weight, fair_feather;
 uniform float use_cosine, use_feather;
-uniform vec3 line_color;           // of a wireframe; negative: the picture
-layout(location = 0) out vec3 color;
-layout(location = 1) out vec2 depth_and_weight;
+uniform float largest_lod;
+uniform bool line;                 // of a wireframe
+layout(location = 0) out vec4 sample_of_view;   // depth, quality, fairness, level of detail (-1: a line)
 
 // Spelled out, because drivers filter 8-bit textures with few bits.
 float feather_at(vec2 st) {
@@ -55,10 +53,10 @@ void main() {
   // Spelled out, because OpenGL leaves the choice of the mipmap to the driver.
   vec2 along_x = dFdx(st) * size, along_y = dFdy(st) * size;
   float lod = 0.5 * log2(max(max(dot(along_x, along_x), dot(along_y, along_y)), 1.0));
-  float weight = mix(1.0, texelFetch(cos_phi, gl_PrimitiveID).r, use_cosine) *
-                 mix(1.0, feather_at(st), use_feather);
-  color = line_color.r < 0.0 ? gain * textureLod(picture, st, lod).rgb : line_color;
-  depth_and_weight = vec2(texture_and_depth.w, clamp(weight, least_weight, 1.0));
+  float edge = feather_at(st);
+  float quality = mix(1.0, texelFetch(cos_phi, gl_PrimitiveID).r, use_cosine) * mix(1.0, edge, use_feather);
+  sample_of_view = vec4(texture_and_depth.w, clamp(quality, least_weight, 1.0),
+                        clamp(edge / fair_feather - 1.0, 0.0, 1.0), line ? -1.0 : min(lod, largest_lod));
 }
 )";
 
@@ -109,6 +107,7 @@ GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_m
     : camera_(view_mesh.camera),
       object_from_camera_(*view.object_from_camera),
       area_(pyramid.area),
+      levels_(static_cast<int>(pyramid.levels.size())),
       gain_(view.gain.cast<float>()),
       index_count_(static_cast<GLsizei>(3 * view_mesh.mesh.triangles.size())) {
   check_limits(gl, view, view_mesh, pyramid);
@@ -155,6 +154,13 @@ GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_m
   check_gl(gl, ("the mesh and picture of view " + view.name).c_str());
 }
 
+void GpuView::place(Camera const& camera, Eigen::Isometry3d const& object_from_camera, LayerPicture& picture) const {
+  picture.texture = picture_.name();
+  picture.size = Eigen::Vector2f(static_cast<float>(area_.width), static_cast<float>(area_.height));
+  picture.gain = gain_;
+  picture.place = picture_place(camera_, area_, object_from_camera_.inverse() * object_from_camera, camera);
+}
+
 ViewPass::ViewPass(GlFunctions const& gl) : gl_(gl), program_(gl, kVertexShader, kFragmentShader) {}
 
 bool ViewPass::in_front(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera) {
@@ -187,25 +193,23 @@ bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d
   program_.use();
   gl_.UniformMatrix4fv(program_.uniform("clip_from_source"), 1, GL_FALSE, clip_from_source.data());
   gl_.UniformMatrix4fv(program_.uniform("sample_from_source"), 1, GL_FALSE, samples.data());
-  gl_.Uniform3f(program_.uniform("gain"), view.gain_.x(), view.gain_.y(), view.gain_.z());
-  gl_.Uniform1f(program_.uniform("least_weight"), kLeastPixelWeight);
+  gl_.Uniform1f(program_.uniform("least_weight"), static_cast<float>(SoftZ::kLeastQuality));
+  gl_.Uniform1f(program_.uniform("fair_feather"), static_cast<float>(SoftZ::kFairFeather));
   gl_.Uniform2f(program_.uniform("size"), static_cast<float>(view.area_.width), static_cast<float>(view.area_.height));
   gl_.Uniform1f(program_.uniform("use_cosine"), look.cosine ? 1 : 0);
   gl_.Uniform1f(program_.uniform("use_feather"), look.feather ? 1 : 0);
-  gl_.Uniform3f(program_.uniform("line_color"), -1, -1, -1);
+  gl_.Uniform1f(program_.uniform("largest_lod"), static_cast<float>(view.levels_ - 1));
+  gl_.Uniform1i(program_.uniform("line"), 0);
   gl_.ActiveTexture(GL_TEXTURE0);
-  gl_.BindTexture(GL_TEXTURE_2D, view.picture_.name());
-  gl_.ActiveTexture(GL_TEXTURE1);
   gl_.BindTexture(GL_TEXTURE_2D, view.feather_.name());
-  gl_.ActiveTexture(GL_TEXTURE2);
+  gl_.ActiveTexture(GL_TEXTURE1);
   gl_.BindTexture(GL_TEXTURE_BUFFER, view.cos_phi_texture_.name());
-  gl_.Uniform1i(program_.uniform("picture"), 0);
-  gl_.Uniform1i(program_.uniform("feather"), 1);
-  gl_.Uniform1i(program_.uniform("cos_phi"), 2);
+  gl_.Uniform1i(program_.uniform("feather"), 0);
+  gl_.Uniform1i(program_.uniform("cos_phi"), 1);
   gl_.BindVertexArray(view.vertex_array_.name());
   gl_.DrawElements(GL_TRIANGLES, view.index_count_, GL_UNSIGNED_INT, nullptr);
   if (look.wireframe) {
-    gl_.Uniform3f(program_.uniform("line_color"), look.wireframe->x(), look.wireframe->y(), look.wireframe->z());
+    gl_.Uniform1i(program_.uniform("line"), 1);
     gl_.PolygonMode(GL_FRONT_AND_BACK, GL_LINE);
     gl_.DepthFunc(GL_LEQUAL);
     gl_.DrawElements(GL_TRIANGLES, view.index_count_, GL_UNSIGNED_INT, nullptr);

@@ -1,9 +1,9 @@
 #pragma once
 #include <Eigen/Geometry>
-#include <optional>
 
 #include "acquire/scan_set.h"
 #include "mesh/view_mesh.h"
+#include "viewer/blend/soft_z_compositor.h"
 #include "viewer/gl/gl_objects.h"
 #include "viewer/view_based/picture_pyramid.h"
 
@@ -14,12 +14,15 @@ class GpuView {
  public:
   /// Throws Error{bad_input} where sizes do not fit each other or exceed what OpenGL can do here.
   GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid);
+  /// Where the compositor finds the picture.
+  void place(Camera const& camera, Eigen::Isometry3d const& object_from_camera, LayerPicture& picture) const;
 
  private:
   friend class ViewPass;
   Camera camera_;
   Eigen::Isometry3d object_from_camera_;
   cv::Rect area_;
+  int levels_ = 0;
   Eigen::Vector3f gain_;
   Eigen::AlignedBox3d bounds_;  ///< of the vertices, in the view's camera coordinates
   GLsizei index_count_ = 0;
@@ -33,12 +36,11 @@ class GpuView {
 class ViewPass {
  public:
   explicit ViewPass(GlFunctions const& gl);
-  /// Into the framebuffer that is bound (LayerTargets::begin_layer): linear light times gain and the pixel weight
-  /// w_cos · w_feather; z in the camera. Back faces are culled. False (and nothing is drawn) where all of the view lies
+  /// Into the framebuffer that is bound (LayerTargets::begin_layer). Back faces are culled. False (and nothing is drawn) where all of the view lies
   /// behind the camera.
   struct Look {
     bool cosine = true, feather = true;           ///< whether they count in the weight
-    std::optional<Eigen::Vector3f> wireframe;     ///< edges over the picture, in this colour
+    bool wireframe = false;                      ///< edges over the picture, in its false colour
   };
   bool draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
             Look const& look) const;

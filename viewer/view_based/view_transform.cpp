@@ -34,6 +34,20 @@ bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& cam
   return high > 0;
 }
 
+PicturePlace picture_place(Camera const& source, cv::Rect const& area, Eigen::Isometry3d const& source_from_camera,
+                           Camera const& camera) {
+  Eigen::Matrix<double, 3, 4> const texel =
+      picture_from_camera(source, area.x, area.y) * source_from_camera.matrix();
+  // x and y of the point, in units of z (perspective) or as they are (orthographic).
+  Eigen::Matrix<double, 2, 3> xy;
+  xy << 1 / camera.fx(), 0, -camera.cx() / camera.fx(), 0, 1 / camera.fy(), -camera.cy() / camera.fy();
+  Eigen::Matrix3d along = Eigen::Matrix3d::Zero(), at = Eigen::Matrix3d::Zero();
+  (camera.is_perspective() ? along : at) = texel.leftCols<2>() * xy;
+  along.col(2) += texel.col(2);
+  at.col(2) += texel.col(3);
+  return {along.cast<float>(), at.cast<float>()};
+}
+
 ScreenTransform screen_transform(Camera const& camera, Eigen::Isometry3d const& camera_from_source,
                                  DepthRange const& range) {
   auto picture = picture_from_camera(camera);
