@@ -1,0 +1,48 @@
+#include "viewer/window/measuring.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace scanview {
+
+std::optional<Eigen::Vector3d> ShownFrame::pick(double x, double y, int width, int height) const {
+  if (frame.depth.empty() || width < 1 || height < 1) return std::nullopt;
+  double const u = (x + 0.5) * frame.depth.cols / width - 0.5, v = (y + 0.5) * frame.depth.rows / height - 0.5;
+  if (!camera.contains({u, v})) return std::nullopt;
+  int const column = std::min(static_cast<int>(std::floor(u + 0.5)), frame.depth.cols - 1);
+  int const row = std::min(static_cast<int>(std::floor(v + 0.5)), frame.depth.rows - 1);
+  float const depth = frame.depth(row, column);
+  if (!std::isfinite(depth)) return std::nullopt;
+  return object_from_camera * camera.unproject(u, v, depth);
+}
+
+std::optional<Eigen::Vector2d> ShownFrame::place(Eigen::Vector3d const& p_object, int width, int height) const {
+  if (camera.width() < 1 || camera.height() < 1) return std::nullopt;
+  Eigen::Vector2d const pixel = camera.project(object_from_camera.inverse() * p_object);
+  if (!pixel.allFinite()) return std::nullopt;
+  return Eigen::Vector2d((pixel.x() + 0.5) * width / camera.width() - 0.5,
+                         (pixel.y() + 0.5) * height / camera.height() - 0.5);
+}
+
+void DistanceTool::click(std::optional<Eigen::Vector3d> const& p_object) {
+  if (!p_object || !p_object->allFinite()) return;
+  if (points_.size() == 2) points_.clear();
+  points_.push_back(*p_object);
+}
+
+void DistanceTool::remove_last() {
+  if (!points_.empty()) points_.pop_back();
+}
+
+std::optional<double> DistanceTool::distance() const {
+  if (points_.size() != 2) return std::nullopt;
+  return (points_[1] - points_[0]).norm();
+}
+
+std::string length_text(double length, Unit unit) {
+  return fmt::format("{:.4g} {}", length, unit == Unit::arbitrary ? "(no known scale)" : to_string(unit));
+}
+
+}  // namespace scanview
