@@ -306,7 +306,7 @@ class WindowFolder : public testing::Test {
       double const a = 0.4 * i;
       poses.push_back(test::look_at(4 * Vector3d(std::sin(a), 0.1 * i, std::cos(a)), {0, 0, 0}));
     }
-    scene_ = test::scan(test::sphere({0, 0, 0}, 1), Camera::perspective(64, 48, 60, 60, 32, 24), poses, 0.3, 0.02);
+    scene_ = test::scan(test::sphere({0, 0, 0}, 1), Camera::perspective(256, 192, 240, 240, 128, 96), poses, 0.1, 0.02);
     Context context;
     write_scan_set(folder_, scene_.set, context);
     for (std::size_t i = 0; i < 4; ++i)
@@ -346,7 +346,7 @@ TEST_F(WindowFolder, MarksThatAreClickedRegisterTheSet) {
   Isometry3d const first = *scene_.set.views[0].object_from_camera;
   for (std::size_t view = 0; view < 4; ++view) {
     Isometry3d const wanted = first.inverse() * *scene_.set.views[view].object_from_camera;
-    EXPECT_LT((set.views[view].object_from_camera->translation() - wanted.translation()).norm(), 0.15) << view;
+    EXPECT_LT((set.views[view].object_from_camera->translation() - wanted.translation()).norm(), 0.1) << view;
   }
 }
 
@@ -356,14 +356,14 @@ TEST_F(WindowFolder, PointsNeedDepth) {
   desk.draw(640, 480);
   EXPECT_NE(click(desk, {1, 1}), "");    // background
   EXPECT_NE(click(desk, {-3, 20}), "");  // beside the picture
-  EXPECT_NE(click(desk, {63.8, 47}), "");
+  EXPECT_NE(click(desk, {255.8, 191}), "");
   EXPECT_NE(click(desk, {1e8, -1e8}), "");
   EXPECT_FALSE(fs::exists(folder_ / "marks.json"));
-  EXPECT_EQ(click(desk, {32, 24}), "");
+  EXPECT_EQ(click(desk, {128, 96}), "");
   auto const marks = RegistrationMarks::from_json(read_json(folder_ / "marks.json"), {});
   ASSERT_EQ(marks.of("000").size(), 1U);
   EXPECT_EQ(marks.of("000")[0].name, "1");
-  EXPECT_LT((marks.of("000")[0].pixel - Vector2d(32, 24)).norm(), 0.01);
+  EXPECT_LT((marks.of("000")[0].pixel - Vector2d(128, 96)).norm(), 0.01);
   EXPECT_EQ(desk.obey(Command::remove_last), "");
   EXPECT_TRUE(RegistrationMarks::from_json(read_json(folder_ / "marks.json"), {}).empty());
   EXPECT_NE(desk.obey(Command::remove_last), "");  // nothing left
@@ -374,10 +374,10 @@ TEST_F(WindowFolder, APointThatIsPassedOverStaysPassedOver) {
   desk.enter(WindowMode::mark);
   desk.draw(640, 480);
   desk.obey(Command::previous_point);  // there is none below 1
-  click(desk, {32, 24});
+  click(desk, {128, 96});
   desk.obey(Command::next_point);  // 2 is not seen here
-  click(desk, {30, 24});
-  click(desk, {28, 24});
+  click(desk, {120, 96});
+  click(desk, {112, 96});
   auto const marks = RegistrationMarks::from_json(read_json(folder_ / "marks.json"), {});
   EXPECT_TRUE(marks.has("000", "1") && marks.has("000", "3") && marks.has("000", "4"));
   EXPECT_FALSE(marks.has("000", "2"));
@@ -407,7 +407,7 @@ TEST_F(WindowFolder, OutlinesAreWhatMeshReads) {
   ASSERT_EQ(marks.at("000").keep.size(), 1U);
   ASSERT_EQ(marks.at("000").cut.size(), 1U);
   EXPECT_EQ(marks.at("000").keep[0].size(), 4U);
-  EXPECT_NEAR(marks.at("000").keep[0][3].y(), 47.5, 1e-9);  // a corner beside the picture goes to its border
+  EXPECT_NEAR(marks.at("000").keep[0][3].y(), 191.5, 1e-9);  // a corner beside the picture goes to its border
   EXPECT_LT((marks.at("000").cut[0][1] - Vector2d(20, 10)).norm(), 0.01);
   EXPECT_EQ(marks.at("001").remove.size(), 1U);
 
@@ -476,7 +476,7 @@ TEST_F(WindowFolder, KeyframesAreReadBack) {
   }
   keyframes.remove_last();
   write_json(folder_ / "path.json", keyframes.to_json());
-  auto const path = read_camera_path(folder_ / "path.json", scene_.set, 64, 48);
+  auto const path = read_camera_path(folder_ / "path.json", scene_.set, 256, 192);
   ASSERT_EQ(path.size(), 6U);
   EXPECT_EQ(path[0].camera, scene_.set.views[0].image.camera);
   EXPECT_TRUE(path[5].object_from_camera.isApprox(*scene_.set.views[1].object_from_camera, 1e-12));

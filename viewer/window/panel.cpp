@@ -160,7 +160,6 @@ void draw_mode(PanelContent& content, PanelAnswer& answer) {
     ImGui::SameLine();
     radio("cut", content.outline, OutlineKind::cut);
     if (ImGui::SmallButton("close (Enter)")) answer.commands.push_back(Command::close_outline);
-    ImGui::SameLine();
   }
   if (shows_picture(content.mode)) {
     if (ImGui::SmallButton("< view")) answer.commands.push_back(Command::previous_view);
@@ -235,6 +234,16 @@ void draw_overlay(Overlay const& overlay, ImVec2 const& corner, ImVec2 const& si
   list.PopClipRect();
 }
 
+void draw_message(std::string const& message, ImVec2 const& corner, ImVec2 const& size) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  float const width = std::max(1.0F, size.x - 32);
+  ImVec2 const text = ImGui::CalcTextSize(message.c_str(), nullptr, false, width);
+  ImVec2 const from(corner.x + 16, corner.y + size.y - text.y - 16);
+  list.AddRectFilled(ImVec2(from.x - 6, from.y - 4), ImVec2(from.x + text.x + 6, from.y + text.y + 4),
+                     IM_COL32(0, 0, 0, 190), 4);
+  list.AddText(nullptr, 0, from, IM_COL32(235, 235, 235, 255), message.c_str(), nullptr, width);
+}
+
 }  // namespace
 
 struct Panel::State {
@@ -267,12 +276,12 @@ Panel::~Panel() {
 
 bool Panel::takes_keys() const { return visible && ImGui::GetIO().WantTextInput; }
 
-Viewport Panel::viewport(int width, int height) const {
+Viewport Panel::viewport(int width, int height, WindowMode mode) const {
   if (!visible) return {0, 0, width, height};
   double const pixels = state_->scale * state_->window.pixels_per_unit();
   // In a small window the picture comes first.
   int const left = std::min(static_cast<int>(kWidth * pixels), width / 2);
-  int const below = std::min(static_cast<int>(kStripHeight * pixels), height / 4);
+  int const below = shows_picture(mode) ? 0 : std::min(static_cast<int>(kStripHeight * pixels), height / 4);
   return {left, 0, std::max(1, width - left), std::max(1, height - below)};
 }
 
@@ -286,6 +295,7 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
   ImVec2 const corner(static_cast<float>(viewport.x) / pixels, static_cast<float>(viewport.y) / pixels);
   ImVec2 const size(static_cast<float>(viewport.width) / pixels, static_cast<float>(viewport.height) / pixels);
   draw_overlay(overlay, corner, size, pixels);
+  if (visible && !content.message.empty()) draw_message(content.message, corner, size);
   if (visible) {
     constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                                         ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus;
@@ -296,27 +306,27 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
     ImGui::TextWrapped("%s", content.set_name.c_str());
     draw_times(content);
     ImGui::Separator();
-    draw_sphere(content, state_->scale, answer);
-    draw_look(content, answer);
-    ImGui::Separator();
+    if (!shows_picture(content.mode)) {
+      draw_sphere(content, state_->scale, answer);
+      draw_look(content, answer);
+      ImGui::Separator();
+    }
     draw_mode(content, answer);
     ImGui::Separator();
     draw_buttons(content, answer);
-    if (!content.message.empty()) {
-      ImGui::Separator();
-      ImGui::TextWrapped("%s", content.message.c_str());
-    }
     if (!content.failures.empty()) {
       ImGui::Separator();
       ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "%zu views cannot be shown", content.failures.size());
       lines_of(content.failures);
     }
     ImGui::End();
-    ImGui::SetNextWindowPos(ImVec2(corner.x, size.y));
-    ImGui::SetNextWindowSize(ImVec2(all.x - corner.x, all.y - size.y));
-    ImGui::Begin("strip", nullptr, kFixed);
-    draw_strip(content, state_->scale);
-    ImGui::End();
+    if (size.y < all.y) {
+      ImGui::SetNextWindowPos(ImVec2(corner.x, size.y));
+      ImGui::SetNextWindowSize(ImVec2(all.x - corner.x, all.y - size.y));
+      ImGui::Begin("strip", nullptr, kFixed);
+      draw_strip(content, state_->scale);
+      ImGui::End();
+    }
     ImGui::PopStyleColor();
   }
   ImGui::Render();

@@ -22,7 +22,7 @@ struct PanelContent {
   std::map<std::string, double> stages;  ///< milliseconds
   bool reading = false;                  ///< pictures are still being read
   std::vector<std::string> failures;     ///< a line a view
-  std::string message;                   ///< what happened last
+  std::string message;                   ///< what happened last; over the picture's lower edge
   SphereInset sphere;
   std::vector<std::string> view_names;
   /// The chosen views as each alone would be seen.
@@ -64,8 +64,8 @@ class Panel {
   Panel& operator=(Panel const&) = delete;
 
   bool visible = true;
-  /// The part of a framebuffer of that size that is left for the picture.
-  Viewport viewport(int width, int height) const;
+  /// The part of a framebuffer of that size that is left for the picture; a flat picture has no strip below it.
+  Viewport viewport(int width, int height, WindowMode mode) const;
   /// Draws into the default framebuffer, around and over `viewport`.
   PanelAnswer draw(PanelContent& content, Overlay const& overlay, Viewport const& viewport);
   /// A person is typing a number: keys are no commands.

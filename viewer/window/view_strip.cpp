@@ -12,11 +12,12 @@ namespace scanview {
 std::vector<PanelContent::StripPicture> ViewStrip::render(ViewBasedRenderer& renderer,
                                                           std::vector<UsedView> const& used, PathCamera const& eye,
                                                           Viewport const& viewport) {
+  constexpr double kLeast = 0.005;  // less would read 0.00
   constexpr std::size_t kMost = 4;
   constexpr int kHeight = 120, kWidest = 240;
   std::vector<UsedView> views;
   for (auto const& view : used) {
-    if (view.weight > 0) views.push_back(view);
+    if (view.weight > kLeast) views.push_back(view);
   }
   std::stable_sort(views.begin(), views.end(),
                    [](UsedView const& a, UsedView const& b) { return a.weight > b.weight; });

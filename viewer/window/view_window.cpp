@@ -166,6 +166,7 @@ class ViewWindow {
     // The panel lights up what the pointer is over; elsewhere a move alone changes nothing.
     if (event.kind != Kind::move || !inside || was_beside_) panel_frames_ = kSettle;
     was_beside_ = !inside;
+    if (event.kind == Kind::key || event.kind == Kind::press) content_.message.clear();
     if (event.kind == Kind::key) {
       if (!panel_.takes_keys()) press(event.key);
       return;
@@ -419,7 +420,7 @@ class ViewWindow {
     window_.size_in_pixels(width_, height_);
     stale_ = false;
     if (width_ < 1 || height_ < 1) return;
-    viewport_ = panel_.viewport(width_, height_);
+    viewport_ = panel_.viewport(width_, height_, content_.mode);
     panel_frames_ = std::max(panel_frames_, 1);
     auto const start = Clock::now();
     if (shows_picture(content_.mode)) {
@@ -427,7 +428,8 @@ class ViewWindow {
       window_.make_current();
       presenter_.upload(picture);
       content_.frame_milliseconds = 1e3 * seconds_since(start);
-      coarse_ = moving_ = false;
+      content_.stages.clear();
+      content_.half_resolution = content_.reading = coarse_ = moving_ = false;
       return;
     }
     // A slow machine turns the object in half the resolution.
