@@ -203,6 +203,19 @@ TEST(DistanceTool, TwoPointsThenAnew) {
   EXPECT_EQ(length_text(*tool.distance(), Unit::mm), "5 mm");
   EXPECT_EQ(length_text(0.123456, Unit::m), "0.1235 m");
   EXPECT_EQ(length_text(1, Unit::arbitrary), "1 (no known scale)");
+  // The line ends at the points; one behind the eye is not drawn.
+  ShownFrame const shown = shown_plane();
+  EXPECT_TRUE(tool.overlay(ShownFrame(), 40, 20, Unit::m).dots.empty());
+  DistanceTool seen;
+  seen.click(shown.pick(12, 4, 40, 20));
+  seen.click(shown.pick(31, 15, 40, 20));
+  auto const overlay = seen.overlay(shown, 40, 20, Unit::m);
+  ASSERT_EQ(overlay.dots.size(), 2U);
+  EXPECT_LT((overlay.dots[1].at - Vector2d(31, 15)).norm(), 1e-9);
+  EXPECT_EQ(overlay.dots[1].label, length_text(*seen.distance(), Unit::m));
+  seen.click(Vector3d(0, 0, 0));
+  seen.click(shown.object_from_camera * Vector3d(0, 0, -1));
+  for (auto const& dot : seen.overlay(shown, 40, 20, Unit::m).dots) EXPECT_TRUE(dot.label.empty());
   tool.click(Vector3d(0, 0, 0));
   EXPECT_EQ(tool.points().size(), 1U);
   EXPECT_FALSE(tool.distance());

@@ -41,6 +41,21 @@ std::optional<double> DistanceTool::distance() const {
   return (points_[1] - points_[0]).norm();
 }
 
+Overlay DistanceTool::overlay(ShownFrame const& shown, int width, int height, Unit unit) const {
+  Overlay overlay;
+  Eigen::Vector3f const yellow(1, 0.85F, 0.2F);
+  Overlay::Line line{{}, yellow, false};
+  for (auto const& p : points_) {
+    auto const at = shown.place(p, width, height);
+    if (!at) continue;
+    line.points.push_back(*at);
+    overlay.dots.push_back({*at, yellow, ""});
+  }
+  if (points_.size() == 2 && line.points.size() == 2) overlay.dots.back().label = length_text(*distance(), unit);
+  overlay.lines.push_back(std::move(line));
+  return overlay;
+}
+
 std::string length_text(double length, Unit unit) {
   return fmt::format("{:.4g} {}", length, unit == Unit::arbitrary ? "(no known scale)" : to_string(unit));
 }

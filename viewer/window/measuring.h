@@ -6,6 +6,7 @@
 
 #include "acquire/scan_set.h"
 #include "viewer/renderer.h"
+#include "viewer/window/overlay.h"
 
 namespace scanview {
 
@@ -31,6 +32,8 @@ class DistanceTool {
   void clear() { points_.clear(); }
   std::vector<Eigen::Vector3d> const& points() const { return points_; }  ///< at most two, object coordinates
   std::optional<double> distance() const;                                 ///< in the set's unit
+  /// Over the frame, shown that large.
+  Overlay overlay(ShownFrame const& shown, int width, int height, Unit unit) const;
 
  private:
   std::vector<Eigen::Vector3d> points_;

@@ -6,16 +6,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
-#include <map>
 #include <set>
 
 #include "base/error.h"
 #include "base/files.h"
 #include "base/image_file.h"
 #include "base/median.h"
-#include "viewer/select/view_selection.h"
-#include "viewer/window/file_watch.h"
 #include "viewer/window/frame_presenter.h"
 #include "viewer/window/glfw_window.h"
 #include "viewer/window/keyframes.h"
@@ -25,6 +21,7 @@
 #include "viewer/window/panel.h"
 #include "viewer/window/pointer_gestures.h"
 #include "viewer/window/view_strip.h"
+#include "viewer/window/viewed_set.h"
 
 namespace scanview {
 namespace {
@@ -42,28 +39,21 @@ std::filesystem::path free_name(std::filesystem::path const& folder, char const*
 
 class ViewWindow {
  public:
-  ViewWindow(std::shared_ptr<ViewLibrary> library, std::filesystem::path const& folder, WindowOptions const& options,
-             Context& context)
+  ViewWindow(std::shared_ptr<ViewLibrary> const& library, std::filesystem::path const& folder,
+             WindowOptions const& options, Context& context)
       : options_(options),
         context_(context),
-        folder_(folder),
-        library_(std::move(library)),
-        control_(library_->set(), library_->radius()),
         window_(options.width, options.height, options.title),
         gl_(load_gl_functions(window_)),
         presenter_(gl_),
         strip_(gl_),
         panel_(window_),
-        desk_(library_, folder),
-        watch_(watched_files(folder, library_->set())) {
-    back_ends_[BackEnd::gl] = [this](ViewBasedOptions const& o) { return make_gl_renderer(window_, library_, o); };
-    for (auto const& [back_end, make] : back_ends_) content_.back_ends.push_back(back_end);
-    bool const processor = back_ends_.contains(BackEnd::cpu) && !is_hardware(window_);
-    content_.back_end = options.back_end.value_or(processor ? BackEnd::cpu : BackEnd::gl);
-    if (!back_ends_.contains(content_.back_end))
-      throw Error(ErrorCode::usage, {}, "this back end does not draw in a window");
-    make_renderer(options.rendering);
-    default_look_ = content_.look = look_of(renderer_->options());
+        viewed_(window_, library, folder, options.rendering, options.back_end, context.threads),
+        control_(library->set(), library->radius()),
+        desk_(library, folder) {
+    content_.back_ends = viewed_.back_ends();
+    content_.back_end = viewed_.renderer().back_end();
+    content_.look = viewed_.look();
     content_.set_name = options.title;
     learn_names();
     if (options.mode != WindowMode::look) enter(options.mode);
@@ -84,14 +74,14 @@ class ViewWindow {
       }
       last = Clock::now();
       look_at_files();
-      look_at_pictures();
+      stale_ = viewed_.picture_has_come() || stale_;
       draw_what_is_stale();
     }
-    return {library_->failures(), std::nullopt};
+    return {viewed_.library()->failures(), std::nullopt};
   }
 
   WindowResult measure() {
-    renderer_->set_patient(true);
+    viewed_.renderer().set_patient(true);
     std::vector<double> frame, panel, all;
     constexpr int kWarmUp = 3;
     for (int i = -kWarmUp; i < options_.frames && !window_.should_close(); ++i) {
@@ -114,26 +104,16 @@ class ViewWindow {
       panel.push_back(1e3 * (drawn - shown));
       all.push_back(seconds_since(start));
     }
-    if (all.empty()) return {library_->failures(), std::nullopt};
-    return {library_->failures(), FrameTimes{median(frame), median(panel), 1 / median(all)}};
+    if (all.empty()) return {viewed_.library()->failures(), std::nullopt};
+    return {viewed_.library()->failures(), FrameTimes{median(frame), median(panel), 1 / median(all)}};
   }
 
  private:
-  void make_renderer(ViewBasedOptions const& rendering) {
-    renderer_ = back_ends_.at(content_.back_end)(rendering);
-    renderer_->set_patient(false);
-    stale_ = true;
-  }
-
   void learn_names() {
-    content_.unit = to_string(library_->set().unit);
+    content_.unit = to_string(viewed_.set().unit);
     content_.view_names.clear();
-    directions_.clear();
-    for (auto const& view : library_->set().views) {
-      content_.view_names.push_back(view.name);
-      directions_.push_back(direction_to_eye(view.image.camera, *view.object_from_camera, library_->set().center));
-    }
-    content_.greatest_threshold = std::max(0.1 * library_->radius(), 10 * default_look_.threshold);
+    for (auto const& view : viewed_.set().views) content_.view_names.push_back(view.name);
+    content_.greatest_threshold = viewed_.greatest_threshold();
   }
 
   void say(std::string const& message) {
@@ -145,7 +125,7 @@ class ViewWindow {
   // How long nothing may happen before something is to be done.
   double patience() const {
     if (content_.turning || stale_ || panel_frames_ > 0) return 0;
-    if (!renderer_->complete()) return 0.02;
+    if (!viewed_.renderer().complete()) return 0.02;
     // What moved is drawn once more in full resolution a moment after it stopped.
     if (coarse_ || strip_stale_) return 0.15;
     return 0.5;
@@ -203,14 +183,14 @@ class ViewWindow {
       case Gesture::Kind::click:
         break;
     }
-    auto const point = shown_.pick(x, y, viewport_.width, viewport_.height);
+    auto const point = viewed_.shown().pick(x, y, viewport_.width, viewport_.height);
     if (content_.mode == WindowMode::measure) {
       distance_.click(point);
       auto const distance = distance_.distance();
       if (!point) {
         say("the object is not there");
       } else if (distance) {
-        say("distance " + length_text(*distance, library_->set().unit));
+        say("distance " + length_text(*distance, viewed_.set().unit));
       }
     } else if (gesture.kind == Gesture::Kind::double_click) {
       if (point) control_.set_pivot(*point);
@@ -323,9 +303,10 @@ class ViewWindow {
       if (shows_picture(content_.mode)) {
         write_file(path, encode_png(desk_.draw(viewport_.width, viewport_.height)));
       } else {
-        renderer_->set_patient(true);
-        Frame const frame = render(width_, height_);
-        renderer_->set_patient(false);
+        viewed_.renderer().set_patient(true);
+        Frame const frame = viewed_.renderer().render(fit_camera(control_.current().camera, width_, height_),
+                                                      control_.current().object_from_camera);
+        viewed_.renderer().set_patient(false);
         write_file(path, encode_png(frame.color));
       }
       say("saved " + path.string());
@@ -346,54 +327,30 @@ class ViewWindow {
   }
 
   void look_at_files() {
-    if (folder_.empty() || seconds_since(looked_at_files_) < 1) return;
+    if (viewed_.folder().empty() || seconds_since(looked_at_files_) < 1) return;
     looked_at_files_ = Clock::now();
-    for (auto const& failure : library_->failures()) {
+    for (auto const& failure : viewed_.library()->failures()) {
       if (!warned_.insert(failure).second) continue;
       context_.warn(failure);
       panel_frames_ = kSettle;
     }
-    if (watch_.changed()) reload();
-  }
-
-  void reload() {
-    auto const old = library_;
-    OrbitControl const eye = control_;
-    try {
-      library_ = ViewLibrary::open(folder_, context_);
-      control_ = OrbitControl(library_->set(), library_->radius());
-      control_.take_eye_of(eye);
-      // A threshold that the person has not touched follows the new error budget.
-      ViewBasedOptions rendering = with_look(options_.rendering, content_.look);
-      bool const untouched = content_.look.threshold == default_look_.threshold && content_.look.soft_z;
-      if (untouched) rendering.threshold = options_.rendering.threshold;
-      make_renderer(rendering);
-      desk_.use(library_);
-      if (untouched) default_look_.threshold = content_.look.threshold = renderer_->options().threshold;
-      learn_names();
-      say("the set's files have changed: read again");
-    } catch (Error const& error) {
-      library_ = old;
-      control_ = eye;
-      say(std::string("the set's files have changed, but cannot be read: ") + error.what());
-      return;
+    switch (viewed_.follow_files(context_)) {
+      case ViewedSet::Reload::unchanged:
+        return;
+      case ViewedSet::Reload::failed:
+        say("the set's files have changed, but cannot be read: " + viewed_.problem());
+        return;
+      case ViewedSet::Reload::done:
+        break;
     }
-    watch_ = FileWatch(watched_files(folder_, library_->set()));
-  }
-
-  // Draws again once a picture that was missing has come.
-  void look_at_pictures() {
-    if (renderer_->complete() || shows_picture(content_.mode)) return;
-    std::size_t come = 0;
-    for (auto const& view : used_)
-      come += !library_->picture_if_ready(view.view).empty() || library_->failed(view.view);
-    stale_ = stale_ || come != come_;
-    come_ = come;
-  }
-
-  Frame render(int width, int height) {
-    return renderer_->render(fit_camera(control_.current().camera, width, height),
-                             control_.current().object_from_camera);
+    OrbitControl const eye = control_;
+    control_ = OrbitControl(viewed_.set(), viewed_.library()->radius());
+    control_.take_eye_of(eye);
+    desk_.use(viewed_.library());
+    if (content_.look.soft_z) content_.look = viewed_.look();
+    learn_names();
+    stale_ = true;
+    say("the set's files have changed: read again");
   }
 
   void draw_what_is_stale() {
@@ -437,22 +394,19 @@ class ViewWindow {
     coarse_ =
         moving_ && options_.frames == 0 && seconds_in_full_ > kSlow && viewport_.width > 1 && viewport_.height > 1;
     int const part = coarse_ ? 2 : 1;
-    shown_.camera = fit_camera(control_.current().camera, viewport_.width / part, viewport_.height / part);
-    shown_.object_from_camera = control_.current().object_from_camera;
-    shown_.frame = renderer_->render(shown_.camera, shown_.object_from_camera);
+    viewed_.render(control_.current(), viewport_.width / part, viewport_.height / part);
     window_.make_current();
-    presenter_.upload(shown_.frame.color);
+    presenter_.upload(viewed_.shown().frame.color);
     double const seconds = seconds_since(start);
     if (!coarse_) seconds_in_full_ = seconds;
     content_.frame_milliseconds = 1e3 * seconds;
     content_.half_resolution = coarse_;
-    content_.stages = renderer_->stages();
-    content_.reading = !renderer_->complete();
-    used_ = renderer_->view_weights(shown_.camera, shown_.object_from_camera);
+    content_.stages = viewed_.renderer().stages();
+    content_.reading = !viewed_.renderer().complete();
     // The strip follows at once where that costs little, else when the eye rests.
     constexpr double kQuick = 0.03;
     strip_stale_ = true;
-    if (panel_.visible && options_.frames == 0 && (seconds < kQuick || !moving_) && renderer_->complete())
+    if (panel_.visible && options_.frames == 0 && (seconds < kQuick || !moving_) && viewed_.renderer().complete())
       render_strip();
   }
 
@@ -462,7 +416,7 @@ class ViewWindow {
       content_.strip.clear();
       return;
     }
-    content_.strip = strip_.render(*renderer_, used_, control_.current(), viewport_);
+    content_.strip = strip_.render(viewed_.renderer(), viewed_.used(), control_.current(), viewport_);
     window_.make_current();
   }
 
@@ -470,51 +424,40 @@ class ViewWindow {
 
   Overlay overlay() const {
     if (shows_picture(content_.mode)) return desk_.overlay();
-    Overlay overlay;
-    auto const place = [&](Eigen::Vector3d const& p) { return shown_.place(p, viewport_.width, viewport_.height); };
-    Eigen::Vector3f const yellow(1, 0.85F, 0.2F);
-    Overlay::Line line{{}, yellow, false};
-    for (auto const& p : distance_.points()) {
-      auto const at = place(p);
-      if (!at) continue;
-      line.points.push_back(*at);
-      overlay.dots.push_back({*at, yellow, ""});
-    }
-    if (auto const distance = distance_.distance(); distance && line.points.size() == 2)
-      overlay.dots.back().label = length_text(*distance, library_->set().unit);
-    overlay.lines.push_back(std::move(line));
-    if (auto const pivot = place(control_.pivot()); pivot && pointer_.held())
-      overlay.dots.push_back({*pivot, {1, 1, 1}, ""});
+    Overlay overlay = distance_.overlay(viewed_.shown(), viewport_.width, viewport_.height, viewed_.set().unit);
+    auto const pivot = viewed_.shown().place(control_.pivot(), viewport_.width, viewport_.height);
+    if (pivot && pointer_.held()) overlay.dots.push_back({*pivot, {1, 1, 1}, ""});
     return overlay;
   }
 
   void draw_panel() {
-    content_.failures = library_->failures();
-    content_.sphere = sphere_inset(directions_, renderer_->sphere_triangles(), used_,
-                                   direction_to_eye(shown_.camera, shown_.object_from_camera, library_->set().center),
-                                   shown_.object_from_camera.linear());
+    content_.failures = viewed_.library()->failures();
+    content_.sphere = viewed_.inset();
     content_.mode_text.clear();
     if (shows_picture(content_.mode)) {
       content_.mode_text = desk_.text();
     } else if (content_.mode == WindowMode::measure) {
       auto const distance = distance_.distance();
-      content_.mode_text.push_back(distance                     ? length_text(*distance, library_->set().unit)
+      content_.mode_text.push_back(distance                     ? length_text(*distance, viewed_.set().unit)
                                    : distance_.points().empty() ? "click the first point"
                                                                 : "click the second point");
     }
     content_.keyframes = keyframes_.size();
     content_.keyframe_command = path_file_.empty() ? ""
                                                    : fmt::format("scanview render {} --path {} -o FOLDER",
-                                                                 folder_.string(), path_file_.string());
+                                                                 viewed_.folder().string(), path_file_.string());
     PanelContent const before = content_;
     PanelAnswer const answer = panel_.draw(content_, overlay(), viewport_);
     desk_.kind = content_.outline;
-    if (answer.default_look) content_.look = default_look_;
+    if (answer.default_look) content_.look = viewed_.default_look();
     if (content_.look != before.look) {
-      renderer_->set_options(with_look(renderer_->options(), content_.look));
+      viewed_.set_look(content_.look);
       stale_ = true;
     }
-    if (content_.back_end != before.back_end) make_renderer(renderer_->options());
+    if (content_.back_end != before.back_end) {
+      viewed_.draw_with(content_.back_end);
+      stale_ = true;
+    }
     if (content_.frames_between != before.frames_between) {
       keyframes_.between = content_.frames_between;
       save_keyframes();
@@ -527,32 +470,23 @@ class ViewWindow {
 
   WindowOptions options_;
   Context& context_;
-  std::filesystem::path folder_;
-  std::shared_ptr<ViewLibrary> library_;
-  OrbitControl control_;
   GlfwWindow window_;
   GlFunctions gl_;
   FramePresenter presenter_;
   ViewStrip strip_;
   Panel panel_;
-  std::map<BackEnd, std::function<std::unique_ptr<ViewBasedRenderer>(ViewBasedOptions const&)>> back_ends_;
-  std::unique_ptr<ViewBasedRenderer> renderer_;
+  ViewedSet viewed_;
+  OrbitControl control_;
+  MarkingDesk desk_;
 
   PanelContent content_;
-  Look default_look_;
   PointerGestures pointer_;
   DistanceTool distance_;
-  MarkingDesk desk_;
   Keyframes keyframes_;
   std::filesystem::path path_file_;
-  FileWatch watch_;
   Clock::time_point looked_at_files_ = Clock::now();
   std::set<std::string> warned_;
 
-  ShownFrame shown_;
-  std::vector<UsedView> used_;  ///< in the shown frame
-  std::vector<Eigen::Vector3d> directions_;
-  std::size_t come_ = 0;  ///< of the used views, how many are read or failed
   int width_ = 0, height_ = 0;
   Viewport viewport_;
   bool stale_ = true, strip_stale_ = false, moving_ = false, coarse_ = false, was_beside_ = true;
@@ -571,7 +505,7 @@ void WindowOptions::validate() const {
 WindowResult view_window(std::shared_ptr<ViewLibrary> library, std::filesystem::path const& folder,
                          WindowOptions const& options, Context& context) {
   options.validate();
-  ViewWindow window(std::move(library), folder, options, context);
+  ViewWindow window(library, folder, options, context);
   return options.frames > 0 ? window.measure() : window.run();
 }
 
