@@ -16,8 +16,15 @@ void compose_background(cv::Mat4b const& picture, cv::Mat4b& composed) {
     std::uint32_t const blue = shade(0.27, 0.12), green = shade(0.24, 0.11), red = shade(0.22, 0.10);
     cv::Vec4b const* const from = picture[y];
     cv::Vec4b* const to = composed[y];
+    cv::Vec4b const shade_of_row(static_cast<std::uint8_t>(blue), static_cast<std::uint8_t>(green),
+                                 static_cast<std::uint8_t>(red), 255);
     for (int x = 0; x < picture.cols; ++x) {
       std::uint32_t const a = from[x][3], b = 255 - a;
+      // Most pixels are one or the other.
+      if (a == 255 || a == 0) {
+        to[x] = a == 0 ? shade_of_row : from[x];
+        continue;
+      }
       to[x][0] = static_cast<std::uint8_t>((a * from[x][0] + b * blue + 127) / 255);
       to[x][1] = static_cast<std::uint8_t>((a * from[x][1] + b * green + 127) / 255);
       to[x][2] = static_cast<std::uint8_t>((a * from[x][2] + b * red + 127) / 255);
@@ -41,7 +48,9 @@ void FramePresenter::upload(cv::Mat4b const& picture) {
                       composed_.data);
     return;
   }
-  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, composed_.cols, composed_.rows, 0, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV,
+  // Without a size OpenGL takes the order of the bytes that are there, which is mostly the window's too: what follows
+  // are then copies without arithmetic.
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, composed_.cols, composed_.rows, 0, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV,
                  composed_.data);
   size_ = picture.size();
   gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
