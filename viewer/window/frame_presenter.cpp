@@ -64,6 +64,8 @@ void FramePresenter::present(Viewport const& part, int height) {
   gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, source_.name());
   gl_.ReadBuffer(GL_COLOR_ATTACHMENT0);
   gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+  constexpr float kAround[] = {0.13F, 0.14F, 0.16F, 1};
+  gl_.ClearBufferfv(GL_COLOR, 0, kAround);
   // The picture's first row is its top, the framebuffer's its bottom.
   gl_.BlitFramebuffer(0, 0, size_.width, size_.height, part.x, height - part.y, part.x + part.width,
                       height - part.y - part.height, GL_COLOR_BUFFER_BIT,

@@ -13,7 +13,8 @@ class FramePresenter {
   explicit FramePresenter(GlFunctions const& gl);
   /// Straight alpha, BGRA (Frame::color).
   void upload(cv::Mat4b const& picture);
-  /// Scaled into `part` of a framebuffer of `height` rows. Before any upload, background alone.
+  /// Scaled into `part` of a framebuffer of `height` rows, what is around it cleared. Before any upload, background
+  /// alone.
   void present(Viewport const& part, int height);
 
  private:

@@ -298,8 +298,8 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
   if (visible && !content.message.empty()) draw_message(content.message, corner, size);
   if (visible) {
     constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
-                                        ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus;
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.13F, 0.14F, 0.16F, 1));
+                                        ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
+                                        ImGuiWindowFlags_NoBackground;
     ImGui::SetNextWindowPos(ImVec2(0, 0));
     ImGui::SetNextWindowSize(ImVec2(corner.x, all.y));
     ImGui::Begin("panel", nullptr, kFixed & ~ImGuiWindowFlags_NoScrollbar);
@@ -327,7 +327,6 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
       draw_strip(content, state_->scale);
       ImGui::End();
     }
-    ImGui::PopStyleColor();
   }
   ImGui::Render();
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
