@@ -31,6 +31,9 @@ void draw_times(PanelContent const& content) {
   ImGui::Text("%.0f frames/s%s%s", total > 0 ? 1000 / total : 0, content.half_resolution ? ", half resolution" : "",
               content.reading ? ", reading" : "");
   ImGui::Text("frame %.1f ms, panel %.1f ms", content.frame_milliseconds, content.panel_milliseconds);
+}
+
+void draw_stages(PanelContent const& content) {
   for (auto const& [name, milliseconds] : content.stages) {
     ImGui::Bullet();
     ImGui::Text("%s %.2f ms", name.c_str(), milliseconds);
@@ -314,6 +317,10 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
     draw_mode(content, answer);
     ImGui::Separator();
     draw_buttons(content, answer);
+    if (!content.stages.empty()) {
+      ImGui::Separator();
+      draw_stages(content);
+    }
     if (!content.failures.empty()) {
       ImGui::Separator();
       ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "%zu views cannot be shown", content.failures.size());
