@@ -46,9 +46,10 @@ void view(fs::path const& folder, WindowOptions options, Session& session) {
     session.report["frame_milliseconds"] = result.times->frame_milliseconds;
     session.report["panel_milliseconds"] = result.times->panel_milliseconds;
     session.report["fps_median"] = result.times->frames_per_second;
-    std::cout << fmt::format("frame {:.2f} ms, panel {:.2f} ms, {:.1f} frames/s (medians of {} frames, {} x {})\n",
-                             result.times->frame_milliseconds, result.times->panel_milliseconds,
-                             result.times->frames_per_second, options.frames, options.width, options.height);
+    std::cout << fmt::format(
+        "frame {:.2f} ms, panel {:.2f} ms, {:.1f} frames/s (medians of {} frames, picture {} x {})\n",
+        result.times->frame_milliseconds, result.times->panel_milliseconds, result.times->frames_per_second,
+        options.frames, result.times->width, result.times->height);
   }
   if (!result.failures.empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
 }

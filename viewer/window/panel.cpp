@@ -323,7 +323,7 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
     }
     if (!content.failures.empty()) {
       ImGui::Separator();
-      ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "%zu views cannot be shown", content.failures.size());
+      ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "views that cannot be shown: %zu", content.failures.size());
       lines_of(content.failures);
     }
     ImGui::End();

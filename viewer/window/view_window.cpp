@@ -89,12 +89,13 @@ class ViewWindow {
       window_.poll(0);
       auto const start = Clock::now();
       control_.turn(360.0 / options_.frames);
+      moved();
       render_frame();
       window_.make_current();
       present();
       gl_.Finish();
       double const shown = seconds_since(start);
-      render_strip();
+      if (strip_is_due()) render_strip();
       draw_panel();
       gl_.Finish();
       double const drawn = seconds_since(start);
@@ -105,7 +106,8 @@ class ViewWindow {
       all.push_back(seconds_since(start));
     }
     if (all.empty()) return {viewed_.library()->failures(), std::nullopt};
-    return {viewed_.library()->failures(), FrameTimes{median(frame), median(panel), 1 / median(all)}};
+    return {viewed_.library()->failures(),
+            FrameTimes{viewport_.width, viewport_.height, median(frame), median(panel), 1 / median(all)}};
   }
 
  private:
@@ -357,11 +359,12 @@ class ViewWindow {
     if (!stale_ && moving_) {
       moving_ = false;
       stale_ = coarse_;
-    } else if (!stale_ && strip_stale_ && panel_.visible) {
+    }
+    if (stale_) render_frame();
+    if (strip_is_due()) {
       render_strip();
       panel_frames_ = std::max(panel_frames_, 1);
     }
-    if (stale_) render_frame();
     if (panel_frames_ <= 0 || width_ < 1 || height_ < 1) return;
     --panel_frames_;
     window_.make_current();
@@ -403,15 +406,19 @@ class ViewWindow {
     content_.half_resolution = coarse_;
     content_.stages = viewed_.renderer().stages();
     content_.reading = !viewed_.renderer().complete();
-    // The strip follows at once where that costs little, else when the eye rests.
-    constexpr double kQuick = 0.03;
     strip_stale_ = true;
-    if (panel_.visible && options_.frames == 0 && (seconds < kQuick || !moving_) && viewed_.renderer().complete())
-      render_strip();
+  }
+
+  /// The strip follows ten times a second where frames are quick, else when the eye rests.
+  bool strip_is_due() const {
+    constexpr double kQuick = 30, kEvery = 0.1;
+    bool const follows = content_.frame_milliseconds < kQuick && seconds_since(strip_drawn_) > kEvery;
+    return strip_stale_ && panel_.visible && (follows || !moving_) && viewed_.renderer().complete();
   }
 
   void render_strip() {
     strip_stale_ = false;
+    strip_drawn_ = Clock::now();
     if (shows_picture(content_.mode) || !panel_.visible) {
       content_.strip.clear();
       return;
@@ -484,7 +491,7 @@ class ViewWindow {
   DistanceTool distance_;
   Keyframes keyframes_;
   std::filesystem::path path_file_;
-  Clock::time_point looked_at_files_ = Clock::now();
+  Clock::time_point looked_at_files_ = Clock::now(), strip_drawn_;
   std::set<std::string> warned_;
 
   int width_ = 0, height_ = 0;

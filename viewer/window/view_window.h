@@ -26,8 +26,9 @@ struct WindowOptions {
 
 /// Medians over the frames of WindowOptions::frames, in full resolution.
 struct FrameTimes {
+  int width = 0, height = 0;      ///< of the picture: the window without panel and strip
   double frame_milliseconds = 0;  ///< rendering and showing, without the panel
-  double panel_milliseconds = 0;  ///< the panel, and the chosen views in the strip below
+  double panel_milliseconds = 0;  ///< the panel, and what falls due of the strip below
   double frames_per_second = 0;   ///< of both, and of swapping
 };
 
