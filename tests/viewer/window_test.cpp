@@ -19,6 +19,7 @@
 #include "viewer/window/measuring.h"
 #include "viewer/window/pointer_gestures.h"
 #include "viewer/window/sphere_inset.h"
+#include "viewer/window/viewed_set.h"
 
 namespace scanview {
 namespace {
@@ -510,6 +511,80 @@ TEST_F(WindowFolder, ChangesAreNoticedOnceTheyAreOver) {
   EXPECT_TRUE(watch.changed());
   EXPECT_FALSE(FileWatch().changed());
   EXPECT_TRUE(watched_files({}, scene_.set).empty());
+}
+
+/// Until the watch has seen a change twice.
+ViewedSet::Reload settle(ViewedSet& viewed) {
+  Context context;
+  viewed.follow_files(context);
+  return viewed.follow_files(context);
+}
+
+TEST_F(WindowFolder, AViewedSetFollowsItsFiles) {
+  auto const gl = make_offscreen_context();
+  gl->make_current();
+  ViewedSet viewed(*gl, library_, folder_, {}, BackEnd::cpu, 0);
+  PathCamera const eye{scene_.set.views[1].image.camera, *scene_.set.views[1].object_from_camera, ""};
+  viewed.renderer().set_patient(true);
+  EXPECT_GT(test::drawn_pixels(viewed.render(eye, 64, 48).frame.color), 100U);
+  EXPECT_FALSE(viewed.picture_has_come());
+  EXPECT_NEAR(viewed.inset().eye.x, 0, 1e-6);
+  EXPECT_EQ(settle(viewed), ViewedSet::Reload::unchanged);
+
+  // Another error budget: a threshold that nobody has touched follows it, one that was chosen stays.
+  double const before = viewed.look().threshold;
+  auto const rewrite = [&](double rms) {
+    scene_.set.error_budget.registration = {rms, 2 * rms};
+    write_manifest(folder_, scene_.set);
+  };
+  rewrite(0.25);
+  ASSERT_EQ(settle(viewed), ViewedSet::Reload::done);
+  EXPECT_GT(viewed.look().threshold, before + 0.4);
+  EXPECT_EQ(viewed.look(), viewed.default_look());
+  Look look = viewed.look();
+  look.threshold = 0.123;
+  look.cosine = false;
+  viewed.set_look(look);
+  rewrite(0.125001);
+  ASSERT_EQ(settle(viewed), ViewedSet::Reload::done);
+  EXPECT_EQ(viewed.look(), look);
+  EXPECT_NEAR(viewed.default_look().threshold, before + 0.25, 0.1);
+
+  // What cannot be read leaves everything as it was.
+  auto const good = viewed.library();
+  write_file(folder_ / "scanset.json", "{");
+  ASSERT_EQ(settle(viewed), ViewedSet::Reload::failed);
+  EXPECT_NE(viewed.problem().find("scanset.json"), std::string::npos);
+  EXPECT_EQ(viewed.library(), good);
+  viewed.renderer().set_patient(true);
+  EXPECT_GT(test::drawn_pixels(viewed.render(eye, 64, 48).frame.color), 100U);
+  rewrite(0.1);
+  EXPECT_EQ(settle(viewed), ViewedSet::Reload::done);
+
+  // One view less in the manifest, one more that cannot be drawn.
+  scene_.set.views.pop_back();
+  write_manifest(folder_, scene_.set);
+  fs::remove(folder_ / "views/000/mesh.ply");
+  ASSERT_EQ(settle(viewed), ViewedSet::Reload::done);
+  EXPECT_EQ(viewed.inset().views.size(), 3U);
+  EXPECT_EQ(viewed.library()->failures().size(), 1U);
+}
+
+TEST_F(WindowFolder, BothBackEndsDrawTheLook) {
+  auto const gl = make_offscreen_context();
+  gl->make_current();
+  ViewedSet viewed(*gl, library_, folder_, {}, std::nullopt, 0);
+  PathCamera const eye{scene_.set.views[1].image.camera, *scene_.set.views[1].object_from_camera, ""};
+  Look look = viewed.look();
+  look.show = SoftZ::Show::winner;
+  viewed.set_look(look);
+  for (BackEnd const back_end : viewed.back_ends()) {
+    viewed.draw_with(back_end);
+    EXPECT_EQ(viewed.renderer().back_end(), back_end);
+    EXPECT_EQ(viewed.look(), look);
+    viewed.renderer().set_patient(true);
+    EXPECT_GT(test::drawn_pixels(viewed.render(eye, 64, 48).frame.color), 100U);
+  }
 }
 
 }  // namespace

@@ -77,7 +77,7 @@ class ViewWindow {
       stale_ = viewed_.picture_has_come() || stale_;
       draw_what_is_stale();
     }
-    return {viewed_.library()->failures(), std::nullopt};
+    return finish(std::nullopt);
   }
 
   WindowResult measure() {
@@ -105,9 +105,8 @@ class ViewWindow {
       panel.push_back(1e3 * (drawn - shown));
       all.push_back(seconds_since(start));
     }
-    if (all.empty()) return {viewed_.library()->failures(), std::nullopt};
-    return {viewed_.library()->failures(),
-            FrameTimes{viewport_.width, viewport_.height, median(frame), median(panel), 1 / median(all)}};
+    if (all.empty()) return finish(std::nullopt);
+    return finish(FrameTimes{viewport_.width, viewport_.height, median(frame), median(panel), 1 / median(all)});
   }
 
  private:
@@ -308,13 +307,13 @@ class ViewWindow {
         viewed_.renderer().set_patient(true);
         Frame const frame = viewed_.renderer().render(fit_camera(control_.current().camera, width_, height_),
                                                       control_.current().object_from_camera);
-        viewed_.renderer().set_patient(false);
         write_file(path, encode_png(frame.color));
       }
       say("saved " + path.string());
     } catch (Error const& error) {
       say(error.what());
     }
+    viewed_.renderer().set_patient(false);
   }
 
   void save_keyframes() {
@@ -328,14 +327,23 @@ class ViewWindow {
     }
   }
 
-  void look_at_files() {
-    if (viewed_.folder().empty() || seconds_since(looked_at_files_) < 1) return;
-    looked_at_files_ = Clock::now();
+  void warn_of_failures() {
     for (auto const& failure : viewed_.library()->failures()) {
       if (!warned_.insert(failure).second) continue;
       context_.warn(failure);
       panel_frames_ = kSettle;
     }
+  }
+
+  WindowResult finish(std::optional<FrameTimes> const& times) {
+    warn_of_failures();
+    return {viewed_.library()->failures(), times};
+  }
+
+  void look_at_files() {
+    if (seconds_since(looked_at_files_) < 1) return;
+    looked_at_files_ = Clock::now();
+    warn_of_failures();
     switch (viewed_.follow_files(context_)) {
       case ViewedSet::Reload::unchanged:
         return;

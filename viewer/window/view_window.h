@@ -39,8 +39,8 @@ struct WindowResult {
 
 /// The interactive viewer: returns when the person closes it. window_help() says the mouse and the keys. `folder` is
 /// the set's: its files are watched, and marks written to it (MarkingDesk); empty for a set in memory. Views that fail
-/// are left out and logged as warnings. Throws Error{io} where there is no display or the OpenGL context is lost, and
-/// Error{usage} where the back end that was asked for is not there.
+/// are left out and logged as warnings, once each. Throws Error{io} where there is no display or the OpenGL context is
+/// lost.
 WindowResult view_window(std::shared_ptr<ViewLibrary> library, std::filesystem::path const& folder,
                          WindowOptions const& options, Context& context);
 

@@ -16,7 +16,8 @@ ViewedSet::ViewedSet(GlContext& context, std::shared_ptr<ViewLibrary> library, s
       watch_(watched_files(folder_, library_->set())) {
   back_ends_[BackEnd::cpu] = [threads](auto const& l, auto const& o) { return make_cpu_renderer(l, o, threads); };
   back_ends_[BackEnd::gl] = [&context](auto const& l, auto const& o) { return make_gl_renderer(context, l, o); };
-  renderer_ = make(back_end.value_or(is_hardware(context) ? BackEnd::gl : BackEnd::cpu), library_, options);
+  if (!back_end) back_end = is_hardware(context) ? BackEnd::gl : BackEnd::cpu;
+  renderer_ = make(*back_end, library_, options);
   default_look_ = look();
   learn_directions();
 }
