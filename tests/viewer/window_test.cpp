@@ -489,8 +489,14 @@ TEST_F(WindowFolder, KeyframesAreReadBack) {
     keyframes.add({view.image.camera, *view.object_from_camera, ""});
   }
   keyframes.remove_last();
-  write_json(folder_ / "path.json", keyframes.to_json());
-  auto const path = read_camera_path(folder_ / "path.json", scene_.set, 256, 192);
+  write_file(folder_ / "scanview-path-000.json", "somebody else's");
+  keyframes.save(folder_);
+  keyframes.save(folder_);
+  EXPECT_EQ(keyframes.file(), folder_ / "scanview-path-001.json");
+  EXPECT_EQ(first_free(folder_, "scanview-path-", ".json"), folder_ / "scanview-path-002.json");
+  EXPECT_EQ(read_file(folder_ / "scanview-path-000.json"), "somebody else's");
+  EXPECT_THROW(Keyframes().save(folder_ / "nowhere"), Error);
+  auto const path = read_camera_path(keyframes.file(), scene_.set, 256, 192);
   ASSERT_EQ(path.size(), 6U);
   EXPECT_EQ(path[0].camera, scene_.set.views[0].image.camera);
   EXPECT_TRUE(path[5].object_from_camera.isApprox(*scene_.set.views[1].object_from_camera, 1e-12));

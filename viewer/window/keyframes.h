@@ -1,4 +1,6 @@
 #pragma once
+#include <filesystem>
+#include <string>
 #include <vector>
 
 #include "base/files.h"
@@ -18,9 +20,17 @@ class Keyframes {
   int between = 24;
   /// What read_camera_path reads; with no keyframe it would refuse it.
   Json to_json() const;
+  /// Writes them to scanview-path-NNN.json in the folder, the first number that is free, and to the same file from then
+  /// on. Throws Error{io}.
+  void save(std::filesystem::path const& folder);
+  std::filesystem::path const& file() const { return file_; }  ///< empty before the first save
 
  private:
   std::vector<PathCamera> cameras_;
+  std::filesystem::path file_;
 };
+
+/// FOLDER/beginNNNend with the first number, from 000, that no file has.
+std::filesystem::path first_free(std::filesystem::path const& folder, std::string const& begin, std::string const& end);
 
 }  // namespace scanview

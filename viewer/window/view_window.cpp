@@ -30,13 +30,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-std::filesystem::path free_name(std::filesystem::path const& folder, char const* pattern) {
-  for (int number = 0;; ++number) {
-    auto path = folder / fmt::format(fmt::runtime(pattern), number);
-    if (!std::filesystem::exists(path)) return path;
-  }
-}
-
 class ViewWindow {
  public:
   ViewWindow(std::shared_ptr<ViewLibrary> const& library, std::filesystem::path const& folder,
@@ -127,12 +120,13 @@ class ViewWindow {
   double patience() const {
     if (content_.turning || stale_ || panel_frames_ > 0) return 0;
     if (!viewed_.renderer().complete()) return 0.02;
-    // What moved is drawn once more in full resolution a moment after it stopped.
-    if (coarse_ || strip_stale_) return 0.15;
-    return 0.5;
+    return moving_ || (strip_stale_ && panel_.visible) ? kRest : 0.5;
   }
 
-  void moved() { moving_ = stale_ = true; }
+  void moved() {
+    moving_ = stale_ = true;
+    moved_ = Clock::now();
+  }
 
   void handle(WindowEvent const& event) {
     using Kind = WindowEvent::Kind;
@@ -300,7 +294,7 @@ class ViewWindow {
     if (width_ < 1 || height_ < 1) return;
     // A full disk must not end the session.
     try {
-      auto const path = free_name(options_.pictures, "scanview-{:03}.png");
+      auto const path = first_free(options_.pictures, "scanview-", ".png");
       if (shows_picture(content_.mode)) {
         write_file(path, encode_png(desk_.draw(viewport_.width, viewport_.height)));
       } else {
@@ -319,9 +313,8 @@ class ViewWindow {
   void save_keyframes() {
     if (keyframes_.size() == 0) return;
     try {
-      if (path_file_.empty()) path_file_ = free_name(options_.pictures, "scanview-path-{:03}.json");
-      write_json(path_file_, keyframes_.to_json());
-      say(fmt::format("{} keyframes in {}", keyframes_.size(), path_file_.string()));
+      keyframes_.save(options_.pictures);
+      say(fmt::format("{} keyframes in {}", keyframes_.size(), keyframes_.file().string()));
     } catch (Error const& error) {
       say(error.what());
     }
@@ -364,7 +357,8 @@ class ViewWindow {
   }
 
   void draw_what_is_stale() {
-    if (!stale_ && moving_) {
+    // Once more in full resolution a moment after the last move.
+    if (!stale_ && moving_ && seconds_since(moved_) >= kRest) {
       moving_ = false;
       stale_ = coarse_;
     }
@@ -458,9 +452,10 @@ class ViewWindow {
                                                                 : "click the second point");
     }
     content_.keyframes = keyframes_.size();
-    content_.keyframe_command = path_file_.empty() ? ""
-                                                   : fmt::format("scanview render {} --path {} -o FOLDER",
-                                                                 viewed_.folder().string(), path_file_.string());
+    content_.keyframe_command = keyframes_.file().empty()
+                                    ? ""
+                                    : fmt::format("scanview render {} --path {} -o FOLDER", viewed_.folder().string(),
+                                                  keyframes_.file().string());
     PanelContent const before = content_;
     PanelAnswer const answer = panel_.draw(content_, overlay(), viewport_);
     desk_.kind = content_.outline;
@@ -481,7 +476,8 @@ class ViewWindow {
     for (Command const command : answer.commands) obey(command);
   }
 
-  static constexpr int kSettle = 3;  ///< frames that the panel takes until it shows all that a click has changed
+  static constexpr double kRest = 0.15;  ///< seconds after which what moved has come to rest
+  static constexpr int kSettle = 3;      ///< frames that the panel takes until it shows all that a click has changed
 
   WindowOptions options_;
   Context& context_;
@@ -498,8 +494,7 @@ class ViewWindow {
   PointerGestures pointer_;
   DistanceTool distance_;
   Keyframes keyframes_;
-  std::filesystem::path path_file_;
-  Clock::time_point looked_at_files_ = Clock::now(), strip_drawn_;
+  Clock::time_point looked_at_files_ = Clock::now(), strip_drawn_, moved_;
   std::set<std::string> warned_;
 
   int width_ = 0, height_ = 0;
