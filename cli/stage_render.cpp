@@ -24,8 +24,8 @@ StageOutcome render_stage(fs::path const& folder, StageMode mode, Context& conte
                      {}};
   return run_stage(folder, std::move(record), mode, context, [&](StageRecord& out) {
     ScanSet const set = read_scan_set(folder, context);
-    auto const renderer =
-        make_cpu_renderer(std::make_shared<ViewLibrary>(set, read_view_meshes(folder, set, context)), {}, context.threads);
+    auto const renderer = make_cpu_renderer(std::make_shared<ViewLibrary>(set, read_view_meshes(folder, set, context)),
+                                            {}, context.threads);
     auto const path = orbit_path(set, kOrbitFrames, kFrameWidth, kFrameHeight);
     SupersamplingRenderer smooth(*renderer, 2);
     std::vector<Frame> frames;

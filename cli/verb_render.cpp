@@ -48,8 +48,8 @@ void render(RenderArguments const& arguments, Session& session) {
   ScanSet const set = read_scan_set(arguments.set, context);
   auto const path = cameras(arguments, set);
   auto const gl = make_offscreen_context();
-  auto const renderer =
-      make_gl_renderer(*gl, std::make_shared<ViewLibrary>(set, read_view_meshes(arguments.set, set, context)), arguments.options);
+  auto const renderer = make_gl_renderer(
+      *gl, std::make_shared<ViewLibrary>(set, read_view_meshes(arguments.set, set, context)), arguments.options);
   SupersamplingRenderer smooth(*renderer, arguments.supersampling);
   std::error_code error;
   fs::create_directories(arguments.output, error);

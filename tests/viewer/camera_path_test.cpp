@@ -158,7 +158,7 @@ TEST_F(CameraPathFile, RefusesWhatIsNoPath) {
 
 TEST(OrbitControl, OrbitKeepsDistanceAndHorizonAndStopsAtThePoles) {
   auto const scene = turntable(8, 32);
-  OrbitControl control(scene.set);
+  OrbitControl control(scene.set, scene.set.radius());
   for (int i = 0; i < 50; ++i) {
     control.orbit(0.07, 0.11);
     auto const& pose = control.current().object_from_camera;
@@ -172,7 +172,7 @@ TEST(OrbitControl, OrbitKeepsDistanceAndHorizonAndStopsAtThePoles) {
 
 TEST(OrbitControl, TheObjectFollowsThePointer) {
   auto const scene = turntable(8, 0);
-  OrbitControl control(scene.set);
+  OrbitControl control(scene.set, scene.set.radius());
   auto const pixel = [&](Vector3d const& p) {
     return control.current().camera.project(control.current().object_from_camera.inverse() * p);
   };
@@ -190,7 +190,7 @@ TEST(OrbitControl, TheObjectFollowsThePointer) {
 
 TEST(OrbitControl, ZoomNeverPassesThePivot) {
   auto const scene = turntable(8, 0);
-  OrbitControl control(scene.set);
+  OrbitControl control(scene.set, scene.set.radius());
   control.zoom(1);
   EXPECT_NEAR((control.current().object_from_camera.translation() - scene.set.center).norm(), 3.6, 1e-9);
   control.zoom(1e6);
@@ -201,7 +201,7 @@ TEST(OrbitControl, ZoomNeverPassesThePivot) {
 
 TEST(OrbitControl, JumpsToAView) {
   auto const scene = turntable(8, 20);
-  OrbitControl control(scene.set);
+  OrbitControl control(scene.set, scene.set.radius());
   EXPECT_TRUE(control.jump(3));
   EXPECT_TRUE(control.current().object_from_camera.isApprox(*scene.set.views[3].object_from_camera));
   EXPECT_FALSE(control.jump(8));
@@ -213,7 +213,7 @@ TEST(ViewWindow, WithoutADisplaySaysSo) {
   auto const scene = turntable(2, 20);
   Context context;
   try {
-    view_window(scene.set, scene.meshes, {}, context);
+    view_window(std::make_shared<ViewLibrary>(scene.set, scene.meshes), {}, {}, context);
     FAIL();
   } catch (Error const& error) {
     EXPECT_EQ(error.code(), ErrorCode::io);

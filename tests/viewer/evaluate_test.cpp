@@ -74,37 +74,79 @@ TEST(Ssim, WhatLiesOutsideTheMaskHasNoInfluence) {
   EXPECT_NEAR(ssim(a, c, mask), 1, 1e-12);
 }
 
-TEST(HeldOut, AViewComesBackFromTheOthers) {
+TEST(HeldOut, AViewComesBackFromTheOthersAndPeersAreComparedOnTheSamePixels) {
   auto const scene =
       scan(sphere(Vector3d::Zero(), 1), Camera::perspective(200, 160, 190, 190, 100, 80), ring(10, 15), 0.3, 0.02);
-  auto const gl = make_offscreen_context();
   Context context;
-  auto const held_out = evaluate_held_out(*gl, scene.set, scene.meshes, {0, 3}, {}, context);
-  ASSERT_EQ(held_out.size(), 2U);
-  for (auto const& f : held_out) {
+  auto const library = std::make_shared<ViewLibrary>(scene.set, scene.meshes);
+  auto contenders = make_contenders(scene.set, library, {}, context);
+  ASSERT_GE(contenders.size(), 4U);
+  auto const all = evaluate_held_out(contenders, scene.set, {0, 3}, HoldOut::each, context);
+  ASSERT_EQ(all.size(), contenders.size());
+  for (auto const& one : all) ASSERT_EQ(one.views.size(), 2U) << one.name;
+  EXPECT_EQ(all[0].name, "view_based");
+  for (auto const& f : all[0].views) {
     EXPECT_GT(f.psnr_common, 28);
     EXPECT_GT(f.ssim, 0.85);
     EXPECT_GT(f.coverage, 0.9);
     EXPECT_LE(f.psnr_all, f.psnr_common);
     EXPECT_EQ(f.rendered.size(), cv::Size(200, 160));
   }
-  EXPECT_EQ(held_out[1].name, "003");
-  auto const source = evaluate_source_views(*gl, scene.set, scene.meshes, {3}, {}, context);
+  EXPECT_EQ(all[0].views[1].name, "003");
+  for (std::size_t c = 1; c < all.size(); ++c) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      ViewFigures const& ours = all[0].views[i];
+      ViewFigures const& theirs = all[c].views[i];
+      cv::Mat1b const both = ours.object & ours.drawn & theirs.drawn;
+      EXPECT_NEAR(theirs.psnr_lead,
+                  psnr(ours.photograph, ours.rendered, both) - psnr(theirs.photograph, theirs.rendered, both), 1e-12);
+    }
+    EXPECT_NEAR(all[c].psnr_lead.mean, (all[c].views[0].psnr_lead + all[c].views[1].psnr_lead) / 2, 1e-12);
+  }
+  auto const source = evaluate_source_views(library, scene.set, {3}, {}, context);
   EXPECT_GT(source[0].psnr_common, 38);
-  EXPECT_GT(source[0].psnr_common, held_out[1].psnr_common);
+  EXPECT_GT(source[0].psnr_common, all[0].views[1].psnr_common);
 
-  auto const section = evaluate_section(held_out, source);
+  auto const section = evaluate_section(all, source);
   EXPECT_EQ(section.id, "evaluate");
   EXPECT_NE(section.html.find("003"), std::string::npos);
+  EXPECT_NE(section.html.find("lumigraph"), std::string::npos);
+}
+
+TEST(HeldOut, ViewsHeldOutTogetherSeeNoneOfTheOthers) {
+  // With every view but one held out, only that one is left to draw from.
+  auto const scene =
+      scan(sphere(Vector3d::Zero(), 1), Camera::perspective(100, 80, 95, 95, 50, 40), ring(4, 15), 0.3, 0.02);
+  Context context;
+  auto const library = std::make_shared<ViewLibrary>(scene.set, scene.meshes);
+  auto contenders = make_contenders(scene.set, library, {}, context);
+  auto const together = evaluate_held_out(contenders, scene.set, {0, 1, 2}, HoldOut::together, context);
+  auto const renderer = make_cpu_renderer(library);
+  renderer->exclude({0, 1, 2});
+  auto const frame = renderer->render(scene.set.views[0].image.camera, *scene.set.views[0].object_from_camera);
+  // A quarter of a turn away: half of what the other view sees, and only its rim.
+  EXPECT_NEAR(together[0].views[0].coverage, 0.5, 0.2);
+  EXPECT_NEAR(static_cast<double>(drawn_pixels(frame.color)),
+              static_cast<double>(cv::countNonZero(together[0].views[0].drawn)), 200);
 }
 
 TEST(HeldOut, TheOnlyViewCannotBeHeldOut) {
   auto const scene =
       scan(sphere(Vector3d::Zero(), 1), Camera::perspective(40, 30, 40, 40, 20, 15), ring(1, 0), 0.3, 0.02);
-  auto const gl = make_offscreen_context();
   Context context;
-  EXPECT_THROW(evaluate_held_out(*gl, scene.set, scene.meshes, {0}, {}, context), Error);
-  EXPECT_THROW(evaluate_held_out(*gl, scene.set, scene.meshes, {7}, {}, context), Error);
+  auto contenders = make_contenders(scene.set, std::make_shared<ViewLibrary>(scene.set, scene.meshes), {}, context);
+  EXPECT_THROW(evaluate_held_out(contenders, scene.set, {0}, HoldOut::each, context), Error);
+  EXPECT_THROW(evaluate_held_out(contenders, scene.set, {7}, HoldOut::each, context), Error);
+}
+
+TEST(ConfidenceInterval, IsStudents) {
+  // Mean 2, standard deviation 1, three values: 2 ± 4.303 / √3.
+  Interval const interval = confidence_interval({1, 2, 3});
+  EXPECT_NEAR(interval.mean, 2, 1e-12);
+  EXPECT_NEAR(interval.low, 2 - 4.302653 / std::sqrt(3), 1e-5);
+  EXPECT_NEAR(interval.high, 2 + 4.302653 / std::sqrt(3), 1e-5);
+  EXPECT_EQ(confidence_interval({5}).low, 5);
+  EXPECT_EQ(confidence_interval({}).mean, 0);
 }
 
 TEST(HeldOut, APhotographIsComparedInTheSetsExposure) {
@@ -112,11 +154,13 @@ TEST(HeldOut, APhotographIsComparedInTheSetsExposure) {
   // leave less than 20 dB. What remains is the rim, a fifteenth of these few pixels, whose samples are averaged.
   auto scene = scan(sphere(Vector3d::Zero(), 1), Camera::perspective(80, 60, 75, 75, 40, 30), ring(4, 15), 0.3, 0.02);
   scene.set.views[1].gain = {1.4, 1.2, 0.8};
-  auto const gl = make_offscreen_context();
   Context context;
   ViewBasedOptions options;
   options.fill_views = 0;  // which would add other exposures at the rim
-  EXPECT_GT(evaluate_source_views(*gl, scene.set, scene.meshes, {1}, options, context)[0].psnr_common, 35);
+  EXPECT_GT(
+      evaluate_source_views(std::make_shared<ViewLibrary>(scene.set, scene.meshes), scene.set, {1}, options, context)[0]
+          .psnr_common,
+      35);
 }
 
 TEST(Exposure, FindsTheGainsThatWereTaken) {

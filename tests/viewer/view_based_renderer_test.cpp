@@ -49,7 +49,8 @@ double psnr_to_truth(Frame const& frame, Surface const& surface, Camera const& c
 }
 
 Frame draw(Scene const& scene, Camera const& camera, Isometry3d const& pose, ViewBasedOptions const& options = {}) {
-  return make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes), options)->render(camera, pose);
+  return make_gl_renderer(context(), std::make_shared<ViewLibrary>(scene.set, scene.meshes), options)
+      ->render(camera, pose);
 }
 
 TEST(ViewBasedRenderer, ReproducesThePhotographAtASourceCamera) {

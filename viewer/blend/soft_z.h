@@ -27,22 +27,22 @@ struct LayerWeight {
 ///   need        = 1 − sum(weight · min(1, 0.35 + q / 0.1) · seen) / 0.3, between 0 and 1,
 /// where they have no sample, or only ones behind something that they do not see; there others fill:
 ///   colour      = mean with shares (weight + need · f · fill) · q · seen.
-/// Views that fill leave no ghosts where they are not needed and fade in towards the rim of a hole. With all transitions
-/// hard and nothing that fills this is the paper's "nearest reliable depth, and everything within the threshold of it";
-/// with them nothing switches when the eye or a weight moves a little. The furthest sample is always reliable and the
-/// nearest reliable one always seen, so a pixel with a sample of positive rank gets a colour.
+/// Views that fill leave no ghosts where they are not needed and fade in towards the rim of a hole. With all
+/// transitions hard and nothing that fills this is the paper's "nearest reliable depth, and everything within the
+/// threshold of it"; with them nothing switches when the eye or a weight moves a little. The furthest sample is always
+/// reliable and the nearest reliable one always seen, so a pixel with a sample of positive rank gets a colour.
 ///
 /// Colours are taken where each view's picture shows the point at the mean depth: one surface, less noisy than each
 /// view's own, instead of as many as there are views.
 struct SoftZ {
   static constexpr int kMaxLayers = 24;
-  static constexpr double kGoodEnough = 0.3;      ///< where the main views' goodness reaches it, nothing fills
-  static constexpr double kGoodAtZero = 0.35;     ///< goodness of a sample with q = 0
-  static constexpr double kGoodQuality = 0.1;     ///< q that adds 1 to it
-  static constexpr double kFairFeather = 0.03;    ///< what only fills counts from this feather on, fully from twice as
-                                                  ///< much: the last fringe of a mesh hangs from the true outline
-  static constexpr double kLeastQuality = 1e-4;   ///< a view that is alone at its border still shows
-  double threshold = 0;                           ///< >= 0, may be infinite
+  static constexpr double kGoodEnough = 0.3;     ///< where the main views' goodness reaches it, nothing fills
+  static constexpr double kGoodAtZero = 0.35;    ///< goodness of a sample with q = 0
+  static constexpr double kGoodQuality = 0.1;    ///< q that adds 1 to it
+  static constexpr double kFairFeather = 0.03;   ///< what only fills counts from this feather on, fully from twice as
+                                                 ///< much: the last fringe of a mesh hangs from the true outline
+  static constexpr double kLeastQuality = 1e-4;  ///< a view that is alone at its border still shows
+  double threshold = 0;                          ///< >= 0, may be infinite
   double reliability_ratio = 0.1;
   bool nearest = false;  ///< the nearest sample alone, whatever its weight
   enum class Show { picture, weights, winner } show = Show::picture;

@@ -215,8 +215,7 @@ void SoftZCompositor::set_weights(std::vector<LayerWeight> const& weights, SoftZ
   constexpr double kLargest = 1e30;
   double const threshold = std::min(soft_z.threshold, kLargest);
   gl_.Uniform1f(add_.uniform("threshold"), static_cast<float>(threshold));
-  gl_.Uniform1f(add_.uniform("ramp"),
-                static_cast<float>(threshold > 0 ? std::min(2 / threshold, kLargest) : kLargest));
+  gl_.Uniform1f(add_.uniform("ramp"), static_cast<float>(threshold > 0 ? std::min(2 / threshold, kLargest) : kLargest));
   gl_.Uniform1f(add_.uniform("reliability_ratio"), static_cast<float>(soft_z.reliability_ratio));
 }
 

@@ -46,7 +46,8 @@ struct ContenderFigures {
   Interval psnr_lead, ssim_lead;  ///< of ours over this one, over common pixels; 0 for ours
 };
 
-/// each: every one of the views is drawn from all others; together: none of them is used for any (a list of test views).
+/// each: every one of the views is drawn from all others; together: none of them is used for any (a list of test
+/// views).
 enum class HoldOut { each, together };
 
 /// What all contenders draw of the views without having seen them, on the same pixels; ours first. Borders are
@@ -54,8 +55,8 @@ enum class HoldOut { each, together };
 std::vector<ContenderFigures> evaluate_held_out(std::vector<Contender>& contenders, ScanSet const& set,
                                                 std::vector<std::size_t> const& views, HoldOut how, Context& context);
 
-/// Each of `views` rendered with all views in use: how faithfully a photograph comes back from its own camera. The set's
-/// gains count in both.
+/// Each of `views` rendered with all views in use: how faithfully a photograph comes back from its own camera. The
+/// set's gains count in both.
 std::vector<ViewFigures> evaluate_source_views(std::shared_ptr<ViewLibrary> library, ScanSet const& set,
                                                std::vector<std::size_t> const& views, ViewBasedOptions const& options,
                                                Context& context);

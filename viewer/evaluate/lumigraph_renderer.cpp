@@ -149,7 +149,8 @@ class LumigraphRenderer final : public HeldOutRenderer {
     auto const reliable = [&](Sample const& i) {
       double doubt = 0;
       for (auto const& j : samples) {
-        doubt = std::max(doubt, hide(j.depth - i.depth) * std::clamp(2 - 2 * i.quality / (ratio * j.quality), 0.0, 1.0));
+        doubt =
+            std::max(doubt, hide(j.depth - i.depth) * std::clamp(2 - 2 * i.quality / (ratio * j.quality), 0.0, 1.0));
       }
       return 1 - doubt;
     };
@@ -157,7 +158,8 @@ class LumigraphRenderer final : public HeldOutRenderer {
     for (auto const& k : samples) {
       double hidden = 1 - reliable(k);
       for (auto const& i : samples) {
-        if (double const behind = hide(k.depth - i.depth); behind > hidden) hidden = std::max(hidden, reliable(i) * behind);
+        if (double const behind = hide(k.depth - i.depth); behind > hidden)
+          hidden = std::max(hidden, reliable(i) * behind);
       }
       if (hidden < 0.5) seen.push_back(k);
     }

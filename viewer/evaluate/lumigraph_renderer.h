@@ -7,10 +7,10 @@
 namespace scanview {
 
 struct LumigraphOptions {
-  int views = 4;           ///< k
-  double angle = 1;        ///< α: penalty of a radian between the rays to the eye and to a view
+  int views = 4;             ///< k
+  double angle = 1;          ///< α: penalty of a radian between the rays to the eye and to a view
   double resolution = 0.05;  ///< β: penalty of a view whose pixels are twice as large on the surface as the picture's
-  double threshold = -1;   ///< of the depth test: ViewBasedOptions::threshold
+  double threshold = -1;     ///< of the depth test: ViewBasedOptions::threshold
 };
 
 /// Unstructured lumigraph rendering (Buehler, Bosse, McMillan, Gortler, Cohen 2001, §4.3) on the views' meshes: the

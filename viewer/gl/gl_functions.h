@@ -11,6 +11,7 @@ namespace scanview {
   X(GLGETINTEGERV, GetIntegerv)                         \
   X(GLGETSTRING, GetString)                             \
   X(GLENABLE, Enable)                                   \
+  X(GLFINISH, Finish)                                   \
   X(GLDISABLE, Disable)                                 \
   X(GLCULLFACE, CullFace)                               \
   X(GLFRONTFACE, FrontFace)                             \
@@ -31,6 +32,7 @@ namespace scanview {
   X(GLACTIVETEXTURE, ActiveTexture)                     \
   X(GLTEXIMAGE2D, TexImage2D)                           \
   X(GLTEXIMAGE3D, TexImage3D)                           \
+  X(GLTEXSUBIMAGE2D, TexSubImage2D)                     \
   X(GLTEXPARAMETERI, TexParameteri)                     \
   X(GLTEXBUFFER, TexBuffer)                             \
   X(GLGENERATEMIPMAP, GenerateMipmap)                   \
@@ -48,6 +50,7 @@ namespace scanview {
   X(GLBINDFRAMEBUFFER, BindFramebuffer)                 \
   X(GLFRAMEBUFFERTEXTURE2D, FramebufferTexture2D)       \
   X(GLFRAMEBUFFERTEXTURELAYER, FramebufferTextureLayer) \
+  X(GLBLITFRAMEBUFFER, BlitFramebuffer)                 \
   X(GLCHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus)   \
   X(GLCREATESHADER, CreateShader)                       \
   X(GLDELETESHADER, DeleteShader)                       \

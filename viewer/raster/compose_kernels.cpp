@@ -99,9 +99,9 @@ HWY_INLINE Color SampleLevel(RasterTexture const& texture, std::size_t index, V 
   Words const du;
   TextureLevel const& full = texture.levels.front();
   TextureLevel const& level = texture.levels[index];
-  Taps const taps = TapsAt(s, t, static_cast<float>(level.width) / static_cast<float>(full.width),
-                           static_cast<float>(level.height) / static_cast<float>(full.height), level.width,
-                           level.height);
+  Taps const taps =
+      TapsAt(s, t, static_cast<float>(level.width) / static_cast<float>(full.width),
+             static_cast<float>(level.height) / static_cast<float>(full.height), level.width, level.height);
   auto const one = hn::Set(di, 1);
   auto const next_x = hn::Min(hn::Add(taps.x, one), hn::Set(di, level.width - 1));
   auto const next_y = hn::Min(hn::Add(taps.y, one), hn::Set(di, level.height - 1));
@@ -152,7 +152,8 @@ HWY_INLINE Color SampleLayer(ComposedLayer const& layer, std::size_t at, hn::Mas
     }
     std::size_t const last = std::min(layer.texture->levels.size() - 1, static_cast<std::size_t>(most) + 1);
     for (std::size_t level = static_cast<std::size_t>(least); level <= last; ++level) {
-      auto const share = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0F), hn::AbsDiff(lod, hn::Set(d, static_cast<float>(level)))));
+      auto const share =
+          hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 1.0F), hn::AbsDiff(lod, hn::Set(d, static_cast<float>(level)))));
       if (hn::AllFalse(d, hn::Gt(share, hn::Zero(d)))) continue;
       Color const color = SampleLevel(*layer.texture, level, s, t);
       sum.r = hn::Add(sum.r, hn::Mul(share, color.r));
@@ -262,8 +263,8 @@ HWY_INLINE void SoftZShares(ComposedLayer const* layers, Composition const& how,
     float const weight = layers[group.layer[k]].weight;
     if (!(weight > 0)) continue;
     auto const quality = hn::Load(d, group.quality[k]);
-    auto const goodness = hn::Min(
-        one, hn::Add(hn::Set(d, how.good_at_zero), hn::Mul(quality, hn::Set(d, 1.0F / how.good_quality))));
+    auto const goodness =
+        hn::Min(one, hn::Add(hn::Set(d, how.good_at_zero), hn::Mul(quality, hn::Set(d, 1.0F / how.good_quality))));
     auto const there = hn::Gt(quality, hn::Zero(d));
     auto const part = hn::Mul(hn::Mul(hn::Set(d, weight), goodness), hn::Load(d, group.seen[k]));
     good = hn::Add(good, hn::IfThenElseZero(there, part));
@@ -373,7 +374,8 @@ void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition c
         }
         auto const r = Encode(hn::Mul(sum.r, inverse)), g = Encode(hn::Mul(sum.g, inverse)),
                    b = Encode(hn::Mul(sum.b, inverse));
-        auto const opaque = hn::Or(hn::Or(b, hn::ShiftLeft<8>(g)), hn::Or(hn::ShiftLeft<16>(r), hn::Set(du, 0xff000000U)));
+        auto const opaque =
+            hn::Or(hn::Or(b, hn::ShiftLeft<8>(g)), hn::Or(hn::ShiftLeft<16>(r), hn::Set(du, 0xff000000U)));
         bgra = hn::IfThenElseZero(hn::RebindMask(du, any), opaque);
         z = hn::IfThenElse(any, mean_z, z);
       }

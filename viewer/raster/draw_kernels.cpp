@@ -67,12 +67,11 @@ HWY_INLINE V Log2(V x) {
   Ints const di;
   auto const bits = hn::BitCast(di, x);
   auto const exponent = hn::ConvertTo(d, hn::Sub(hn::ShiftRight<23>(bits), hn::Set(di, 127)));
-  auto const mantissa =
-      hn::BitCast(d, hn::Or(hn::And(bits, hn::Set(di, 0x7fffff)), hn::Set(di, 0x3f800000)));
+  auto const mantissa = hn::BitCast(d, hn::Or(hn::And(bits, hn::Set(di, 0x7fffff)), hn::Set(di, 0x3f800000)));
   auto const r = hn::Sub(mantissa, hn::Set(d, 1.0F));
   // A cubic that is exact at both ends, so that levels join without a step.
-  auto const p = hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Set(d, 0.15922F), r), hn::Set(d, -0.58208F)), r),
-                         hn::Set(d, 1.42286F));
+  auto const p =
+      hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Set(d, 0.15922F), r), hn::Set(d, -0.58208F)), r), hn::Set(d, 1.42286F));
   return hn::Add(exponent, hn::Mul(r, p));
 }
 
@@ -93,16 +92,14 @@ class TextureWriter {
     Floats const d;
     Words const du;
     Ints const di;
-    auto const plane = [&](int k) HWY_ATTR {
-      return hn::Add(hn::Set(d, base[k]), hn::Mul(hn::Set(d, slopes.x[k]), lane));
-    };
+    auto const plane = [&](int k)
+                           HWY_ATTR { return hn::Add(hn::Set(d, base[k]), hn::Mul(hn::Set(d, slopes.x[k]), lane)); };
     auto const inverse = hn::Div(hn::Set(d, 1.0F), plane(3));
     auto const s = hn::Mul(plane(1), inverse), t = hn::Mul(plane(2), inverse);
     auto packed = hn::Set(du, label << 16);
     if (target_.largest_lod > 0) {
-      auto const slope = [&](float of_value, float of_w, V value) HWY_ATTR {
-        return hn::Sub(hn::Set(d, of_value), hn::Mul(value, hn::Set(d, of_w)));
-      };
+      auto const slope = [&](float of_value, float of_w, V value)
+                             HWY_ATTR { return hn::Sub(hn::Set(d, of_value), hn::Mul(value, hn::Set(d, of_w))); };
       auto const sx = slope(slopes.x[1], slopes.x[3], s), tx = slope(slopes.x[2], slopes.x[3], t);
       auto const sy = slope(slopes.y[1], slopes.y[3], s), ty = slope(slopes.y[2], slopes.y[3], t);
       auto const along_x = hn::Add(hn::Mul(sx, sx), hn::Mul(tx, tx));
@@ -116,9 +113,8 @@ class TextureWriter {
       }
     }
     packed = hn::Or(packed, hn::IfThenElseZero(hn::RebindMask(du, on_edge), hn::Set(du, 1U << 15)));
-    auto const store = [&](float* to, V value) HWY_ATTR {
-      hn::StoreU(hn::IfThenElse(mask, value, hn::LoadU(d, to + at)), d, to + at);
-    };
+    auto const store = [&](float* to, V value)
+                           HWY_ATTR { hn::StoreU(hn::IfThenElse(mask, value, hn::LoadU(d, to + at)), d, to + at); };
     store(target_.key, key);
     store(target_.s, s);
     store(target_.t, t);
@@ -174,8 +170,7 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
     ScreenVertex const& to = *corners[k == 2 ? 0 : k + 1];
     int const ex = from.y - to.y, ey = to.x - from.x;
     bool const owns = ex > 0 || (ex == 0 && ey > 0);
-    std::int64_t const constant =
-        -(std::int64_t{ex} * from.x + std::int64_t{ey} * from.y) - (owns ? 0 : 1);
+    std::int64_t const constant = -(std::int64_t{ex} * from.x + std::int64_t{ey} * from.y) - (owns ? 0 : 1);
     std::int64_t const at_start = (constant >> 8) + std::int64_t{ex} * left + std::int64_t{ey} * top;
     // Beyond what the steps within a tile can make up for.
     constexpr std::int64_t kFar = 1 << 30;
@@ -228,9 +223,8 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
         if (!hn::AllFalse(d, mask)) {
           auto on_edge = hn::FirstN(d, 0);
           if (writer.wants_edges()) {
-            auto const distance = [&](auto e, int k) HWY_ATTR {
-              return hn::Mul(hn::ConvertTo(d, e), hn::Set(d, edge_scale[k]));
-            };
+            auto const distance = [&](auto e, int k)
+                                      HWY_ATTR { return hn::Mul(hn::ConvertTo(d, e), hn::Set(d, edge_scale[k])); };
             on_edge = hn::Lt(hn::Min(hn::Min(distance(e0, 0), distance(e1, 1)), distance(e2, 2)), hn::Set(d, 0.6F));
           }
           writer.Write(at, mask, key, base, lane, slopes, triangle.label, on_edge);

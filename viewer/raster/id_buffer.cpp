@@ -50,8 +50,7 @@ IdBuffer draw_id_buffer(TriangleMesh const& mesh, Camera const& camera, Eigen::I
   Eigen::AlignedBox3d bounds;
   for (auto const& vertex : mesh.vertices) bounds.extend(vertex.cast<double>());
   DepthRange range;
-  if (mesh.triangles.empty() ||
-      !depth_range(bounds, object_from_camera.inverse(), camera.is_perspective(), range)) {
+  if (mesh.triangles.empty() || !depth_range(bounds, object_from_camera.inverse(), camera.is_perspective(), range)) {
     return buffer;
   }
   std::vector<std::uint32_t> ids(mesh.triangles.size());

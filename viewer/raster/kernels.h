@@ -20,12 +20,12 @@ void draw_ids(ScreenTriangle const* triangles, std::size_t count, TileArea const
 struct ComposedLayer {
   TextureTarget samples;
   RasterTexture const* texture = nullptr;
-  float* quality = nullptr;  ///< scratch: w_cos · w_feather of each sample, 0 where there is none
-  float* fairness = nullptr; ///< scratch: how far the sample counts where its view only fills
+  float* quality = nullptr;   ///< scratch: w_cos · w_feather of each sample, 0 where there is none
+  float* fairness = nullptr;  ///< scratch: how far the sample counts where its view only fills
   float gain[3] = {1, 1, 1};  ///< R, G, B
   float hue[3] = {1, 1, 1};
   float weight = 0, fill = 0;
-  float fill_rank = 0;  ///< `fill` where it is decided what hides what
+  float fill_rank = 0;                 ///< `fill` where it is decided what hides what
   bool cosine = true, feather = true;  ///< whether they count in the weight
   /// Texel (s w, t w, w) of the point that pixel (x, y) of the picture shows at depth z:
   /// z · along (x, y, 1) + at (x, y, 1).

@@ -92,8 +92,12 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
       }
       for (std::size_t i = 0; i < layers.size(); ++i) {
         float* const floats = tile.floats_[i].data();
-        tile.targets_[i] = {floats,           floats + kTilePixels,  floats + 2 * kTilePixels, tile.words_[i].data(),
-                            layers[i].largest_lod, layers[i].wireframe};
+        tile.targets_[i] = {floats,
+                            floats + kTilePixels,
+                            floats + 2 * kTilePixels,
+                            tile.words_[i].data(),
+                            layers[i].largest_lod,
+                            layers[i].wireframe};
       }
       compose(tile);
     });

@@ -8,8 +8,8 @@
 
 namespace scanview {
 
-/// Draws several meshes, each into a layer of its own, tile by tile: all layers of a tile are composed while they are in
-/// cache, and no layer is ever stored whole. Vertices, triangles and tiles are each shared out among the threads.
+/// Draws several meshes, each into a layer of its own, tile by tile: all layers of a tile are composed while they are
+/// in cache, and no layer is ever stored whole. Vertices, triangles and tiles are each shared out among the threads.
 class LayerRasterizer {
  public:
   /// threads: at most so many; 0: all processors.

@@ -9,8 +9,8 @@
 namespace scanview {
 
 /// A vertex on the screen. x, y: 1/256 pixel, the centre of pixel (0, 0) at 0; kBeyond in x: behind the near plane or
-/// outside the guard band, so that its triangles must be clipped. What is linear on the screen: key, by which depths are
-/// compared, nearer is greater: 1/z (perspective) or −z (orthographic); s, t, w: homogeneous texture coordinates in
+/// outside the guard band, so that its triangles must be clipped. What is linear on the screen: key, by which depths
+/// are compared, nearer is greater: 1/z (perspective) or −z (orthographic); s, t, w: homogeneous texture coordinates in
 /// texels, divided by z.
 struct ScreenVertex {
   std::int32_t x, y;

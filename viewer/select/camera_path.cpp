@@ -96,7 +96,9 @@ Isometry3d look_at(Vector3d const& eye, Vector3d const& target, Vector3d const& 
   return pose;
 }
 
-OrbitFrame orbit_frame(ScanSet const& set) {
+OrbitFrame orbit_frame(ScanSet const& set) { return orbit_frame(set, set.radius()); }
+
+OrbitFrame orbit_frame(ScanSet const& set, double radius) {
   if (!set.has_poses()) throw Error(ErrorCode::bad_input, {}, "the set has views without a pose: register it first");
   auto const directions = view_directions(set);
   OrbitFrame frame;
@@ -113,7 +115,7 @@ OrbitFrame orbit_frame(ScanSet const& set) {
   }
   frame.up = circle_axis(directions, frame.up.normalized());
 
-  frame.radius = set.radius();
+  frame.radius = radius;
   if (!(frame.radius > 0)) frame.radius = distances.empty() ? 1 : 0.5 * median(distances);
   // Four radii away: nearly parallel, like the orthographic cameras it stands in for.
   frame.distance = distances.empty() ? 4 * frame.radius : median(distances);

@@ -29,6 +29,8 @@ struct OrbitFrame {
 };
 /// Throws Error{bad_input} where a view has no pose.
 OrbitFrame orbit_frame(ScanSet const& set);
+/// The same of a set without depth images (ViewLibrary::set), whose object has this radius.
+OrbitFrame orbit_frame(ScanSet const& set, double radius);
 
 /// A perspective camera that looks at the centre from `direction` and holds the object's sphere with a margin of a
 /// tenth. Where the eye is inside the sphere (a room), a field of view of 60 degrees.

@@ -57,8 +57,8 @@ cv::Rect area_under(ViewMesh const& view_mesh) {
   for (auto const& vertex : view_mesh.mesh.vertices) box.extend(view_mesh.camera.project(vertex.cast<double>()));
   cv::Rect const all(0, 0, view_mesh.camera.width(), view_mesh.camera.height());
   Eigen::Vector2d const low = box.min().array().max(0.0).floor(), high = box.max().array().ceil() + 1;
-  cv::Rect const area = cv::Rect(cv::Point2d(low.x(), low.y()),
-                                 cv::Point2d(std::min<double>(high.x(), all.width), std::min<double>(high.y(), all.height))) &
+  cv::Rect const area = cv::Rect(cv::Point2d(low.x(), low.y()), cv::Point2d(std::min<double>(high.x(), all.width),
+                                                                            std::min<double>(high.y(), all.height))) &
                         all;
   return area.empty() ? all : area;
 }

@@ -36,11 +36,11 @@ class GpuView {
 class ViewPass {
  public:
   explicit ViewPass(GlFunctions const& gl);
-  /// Into the framebuffer that is bound (LayerTargets::begin_layer). Back faces are culled. False (and nothing is drawn) where all of the view lies
-  /// behind the camera.
+  /// Into the framebuffer that is bound (LayerTargets::begin_layer). Back faces are culled. False (and nothing is
+  /// drawn) where all of the view lies behind the camera.
   struct Look {
-    bool cosine = true, feather = true;           ///< whether they count in the weight
-    bool wireframe = false;                      ///< edges over the picture, in its false colour
+    bool cosine = true, feather = true;  ///< whether they count in the weight
+    bool wireframe = false;              ///< edges over the picture, in its false colour
   };
   bool draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
             Look const& look) const;

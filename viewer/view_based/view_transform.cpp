@@ -36,8 +36,7 @@ bool depth_range(Eigen::AlignedBox3d const& bounds, Eigen::Isometry3d const& cam
 
 PicturePlace picture_place(Camera const& source, cv::Rect const& area, Eigen::Isometry3d const& source_from_camera,
                            Camera const& camera) {
-  Eigen::Matrix<double, 3, 4> const texel =
-      picture_from_camera(source, area.x, area.y) * source_from_camera.matrix();
+  Eigen::Matrix<double, 3, 4> const texel = picture_from_camera(source, area.x, area.y) * source_from_camera.matrix();
   // x and y of the point, in units of z (perspective) or as they are (orthographic).
   Eigen::Matrix<double, 2, 3> xy;
   xy << 1 / camera.fx(), 0, -camera.cx() / camera.fx(), 0, 1 / camera.fy(), -camera.cy() / camera.fy();

@@ -8,8 +8,8 @@
 namespace scanview {
 
 /// Rows of the homogeneous coordinates (u w, v w, w) of a point in camera coordinates, in pixels: those of an area of
-/// the picture that starts at pixel (x, y), whose corner has (0, 0) (a pixel's centre lies at half a pixel). w is z of a
-/// perspective camera and 1 of an orthographic one (Darsa 1998, appendix).
+/// the picture that starts at pixel (x, y), whose corner has (0, 0) (a pixel's centre lies at half a pixel). w is z of
+/// a perspective camera and 1 of an orthographic one (Darsa 1998, appendix).
 Eigen::Matrix<double, 3, 4> picture_from_camera(Camera const& camera, int x = 0, int y = 0);
 
 struct DepthRange {

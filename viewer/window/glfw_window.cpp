@@ -3,6 +3,9 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "base/error.h"
 #include "viewer/gl/current_context.h"
 
@@ -19,24 +22,39 @@ std::string last_error() {
 
 struct GlfwWindow::State {
   GLFWwindow* window = nullptr;
-  Events events;
-  double x = 0, y = 0;
+  std::vector<WindowEvent> events;
+  double x = 0, y = 0;  ///< of the pointer, in the framebuffer's pixels
+  double poll_began = 0, poll_ended = 0;
+  unsigned (*reset_status)() = nullptr;
 
   static State& of(GLFWwindow* window) { return *static_cast<State*>(glfwGetWindowUserPointer(window)); }
 
-  void moved(double to_x, double to_y) {
-    auto const pressed = [&](int button) { return glfwGetMouseButton(window, button) == GLFW_PRESS; };
+  WindowEvent& add(WindowEvent::Kind kind) {
     auto const held = [&](int key) { return glfwGetKey(window, key) == GLFW_PRESS; };
-    bool const left = pressed(GLFW_MOUSE_BUTTON_LEFT);
-    bool const other = pressed(GLFW_MOUSE_BUTTON_RIGHT) || pressed(GLFW_MOUSE_BUTTON_MIDDLE);
-    int width = 1, height = 1;
-    glfwGetWindowSize(window, &width, &height);
-    if ((left || other) && events.drag && height > 0) {
-      bool const pan = other || held(GLFW_KEY_LEFT_SHIFT) || held(GLFW_KEY_RIGHT_SHIFT);
-      events.drag((to_x - x) / height, (to_y - y) / height, pan);
-    }
-    x = to_x;
-    y = to_y;
+    WindowEvent event;
+    event.kind = kind;
+    event.x = x;
+    event.y = y;
+    event.shift = held(GLFW_KEY_LEFT_SHIFT) || held(GLFW_KEY_RIGHT_SHIFT);
+    // What is there as soon as polling begins may have waited since the last time.
+    constexpr double kAtOnce = 0.002;
+    double const now = glfwGetTime();
+    event.seconds = now - poll_began < kAtOnce ? poll_ended : now;
+    events.push_back(event);
+    return events.back();
+  }
+
+  void point_at(double screen_x, double screen_y) {
+    double const scale = pixels_per_unit();
+    x = (screen_x + 0.5) * scale - 0.5;
+    y = (screen_y + 0.5) * scale - 0.5;
+  }
+
+  double pixels_per_unit() const {
+    int pixels = 0, units = 0, ignored = 0;
+    glfwGetFramebufferSize(window, &pixels, &ignored);
+    glfwGetWindowSize(window, &units, &ignored);
+    return pixels > 0 && units > 0 ? static_cast<double>(pixels) / units : 1;
   }
 };
 
@@ -50,6 +68,8 @@ GlfwWindow::GlfwWindow(int width, int height, std::string const& title) : state_
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
+  // Where the driver can, it tells that it was reset instead of drawing nothing from then on.
+  glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);
   state_->window = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
   if (state_->window == nullptr) {
     std::string const why = last_error();
@@ -58,28 +78,27 @@ GlfwWindow::GlfwWindow(int width, int height, std::string const& title) : state_
   }
   GLFWwindow* const window = state_->window;
   glfwSetWindowUserPointer(window, state_.get());
-  glfwGetCursorPos(window, &state_->x, &state_->y);
-  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { State::of(w).moved(x, y); });
-  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int, int, int) {
-    State& state = State::of(w);
-    glfwGetCursorPos(w, &state.x, &state.y);
+  using Kind = WindowEvent::Kind;
+  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+    State::of(w).point_at(x, y);
+    State::of(w).add(Kind::move);
   });
-  glfwSetScrollCallback(window, [](GLFWwindow* w, double, double steps) {
-    if (State::of(w).events.scroll) State::of(w).events.scroll(steps);
+  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
+    State::of(w).add(action == GLFW_PRESS ? Kind::press : Kind::release).button = button;
   });
+  glfwSetScrollCallback(window,
+                        [](GLFWwindow* w, double, double steps) { State::of(w).add(Kind::scroll).steps = steps; });
   glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
-    if (action == GLFW_PRESS && State::of(w).events.key) State::of(w).events.key(key);
+    if (action != GLFW_RELEASE) State::of(w).add(Kind::key).key = key;
   });
-  glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) {
-    if (State::of(w).events.redraw) State::of(w).events.redraw();
-  });
-  glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) {
-    if (State::of(w).events.redraw) State::of(w).events.redraw();
-  });
+  glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { State::of(w).add(Kind::exposed); });
+  glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { State::of(w).add(Kind::exposed); });
   make_current();
   // Frames are drawn when something changes: waiting for the screen only adds delay, and never ends under some virtual
   // displays.
   glfwSwapInterval(0);
+  if (glfwExtensionSupported("GL_ARB_robustness") == GLFW_TRUE)
+    state_->reset_status = reinterpret_cast<unsigned (*)()>(get_proc("glGetGraphicsResetStatusARB"));
 }
 
 GlfwWindow::~GlfwWindow() {
@@ -102,14 +121,15 @@ void GlfwWindow::release() {
 
 GlContext::Function GlfwWindow::get_proc(char const* name) const { return glfwGetProcAddress(name); }
 
-void GlfwWindow::on(Events events) { state_->events = std::move(events); }
-
-void GlfwWindow::poll(double seconds) {
+std::vector<WindowEvent> GlfwWindow::poll(double seconds) {
+  state_->poll_began = glfwGetTime();
   if (seconds > 0) {
     glfwWaitEventsTimeout(seconds);
   } else {
     glfwPollEvents();
   }
+  state_->poll_ended = glfwGetTime();
+  return std::exchange(state_->events, {});
 }
 
 bool GlfwWindow::should_close() const { return glfwWindowShouldClose(state_->window) == GLFW_TRUE; }
@@ -120,8 +140,24 @@ void GlfwWindow::size_in_pixels(int& width, int& height) const {
   glfwGetFramebufferSize(state_->window, &width, &height);
 }
 
+double GlfwWindow::pixels_per_unit() const { return state_->pixels_per_unit(); }
+
+double GlfwWindow::content_scale() const {
+  float x = 1, y = 1;
+  glfwGetWindowContentScale(state_->window, &x, &y);
+  return std::clamp(static_cast<double>(y), 1.0, 4.0);
+}
+
 void GlfwWindow::set_title(std::string const& title) { glfwSetWindowTitle(state_->window, title.c_str()); }
 
-void GlfwWindow::swap() { glfwSwapBuffers(state_->window); }
+void GlfwWindow::swap() {
+  glfwSwapBuffers(state_->window);
+  if (state_->reset_status != nullptr && state_->reset_status() != 0) {
+    throw Error(ErrorCode::io, {},
+                "the graphics driver was reset and has lost the window's pictures: start `scanview view` again");
+  }
+}
+
+GLFWwindow* GlfwWindow::handle() const { return state_->window; }
 
 }  // namespace scanview

@@ -1,9 +1,10 @@
 #pragma once
-#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "viewer/gl/gl_context.h"
+#include "viewer/window/window_event.h"
 
 struct GLFWwindow;
 
@@ -22,21 +23,21 @@ class GlfwWindow final : public GlContext {
   void release() override;
   Function get_proc(char const* name) const override;
 
-  /// What the person does. Positions are shares of the window's height. Unset functions are not called.
-  struct Events {
-    std::function<void(double right, double down, bool pan)> drag;  ///< since the last call; pan: other button or shift
-    std::function<void(double steps)> scroll;
-    std::function<void(int key)> key;  ///< GLFW_KEY_..., when pressed
-    std::function<void()> redraw;      ///< resized or uncovered
-  };
-  void on(Events events);
-  /// Handles what has happened; waits up to `seconds` for something to happen (0: does not wait).
-  void poll(double seconds);
+  /// All that has happened since the last call, in its order: also what began and ended between two calls. Waits up to
+  /// `seconds` for something to happen (0: does not wait).
+  std::vector<WindowEvent> poll(double seconds);
   bool should_close() const;
   void close();
   void size_in_pixels(int& width, int& height) const;
+  /// Pixels of the framebuffer a unit of the screen: more than 1 on some dense screens.
+  double pixels_per_unit() const;
+  /// By how much larger than usual a person wants letters to be.
+  double content_scale() const;
   void set_title(std::string const& title);
+  /// Shows what was drawn. Throws Error{io} where the graphics driver was reset and the context is lost with all it
+  /// held.
   void swap();
+  GLFWwindow* handle() const;  ///< for libraries that know GLFW
 
  private:
   struct State;

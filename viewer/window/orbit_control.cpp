@@ -11,11 +11,32 @@ namespace scanview {
 using Eigen::AngleAxisd;
 using Eigen::Vector3d;
 
-OrbitControl::OrbitControl(ScanSet const& set) : set_(set), frame_(orbit_frame(set)) { reset(); }
+namespace {
+constexpr int kPixels = 480;  // of framing cameras, until a window gives them its size
+}  // namespace
+
+OrbitControl::OrbitControl(ScanSet const& set, double radius)
+    : center_(set.center),
+      frame_(orbit_frame(set, radius)),
+      start_(framing_camera(set, frame_, frame_.start, kPixels, kPixels)) {
+  for (auto const& view : set.views) {
+    Camera const& camera = view.image.camera;
+    views_.push_back(camera.is_perspective()
+                         ? PathCamera{camera, *view.object_from_camera, view.name}
+                         : framing_camera(set, frame_, direction_to_eye(camera, *view.object_from_camera, set.center),
+                                          kPixels, kPixels));
+  }
+  reset();
+}
 
 void OrbitControl::reset() {
-  pivot_ = set_.center;
-  current_ = framing_camera(set_, frame_, frame_.start, 480, 480);
+  pivot_ = center_;
+  current_ = start_;
+}
+
+void OrbitControl::take_eye_of(OrbitControl const& other) {
+  pivot_ = other.pivot_;
+  current_ = other.current_;
 }
 
 void OrbitControl::rotate(AngleAxisd const& rotation) {
@@ -57,16 +78,10 @@ void OrbitControl::zoom(double steps) {
   pose.translation() = pivot_ + to_eye * (wanted / distance);
 }
 
-bool OrbitControl::jump(std::size_t index) {
-  if (index >= set_.views.size()) return false;
-  View const& view = set_.views[index];
-  pivot_ = set_.center;
-  if (view.image.camera.is_perspective()) {
-    current_ = {view.image.camera, *view.object_from_camera, view.name};
-  } else {
-    current_ = framing_camera(set_, frame_, direction_to_eye(view.image.camera, *view.object_from_camera, set_.center),
-                              480, 480);
-  }
+bool OrbitControl::jump(std::size_t view) {
+  if (view >= views_.size()) return false;
+  pivot_ = center_;
+  current_ = views_[view];
   return true;
 }
 

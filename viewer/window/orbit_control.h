@@ -9,8 +9,11 @@ namespace scanview {
 /// screen are shares of the window's height, so that dragging feels the same in any size.
 class OrbitControl {
  public:
-  explicit OrbitControl(ScanSet const& set);
+  /// `radius` is the object's (ViewLibrary::radius). Throws Error{bad_input} where a view has no pose.
+  OrbitControl(ScanSet const& set, double radius);
   PathCamera const& current() const { return current_; }
+  /// Looks from where `other` does, about its pivot: after the set has changed under it.
+  void take_eye_of(OrbitControl const& other);
 
   void reset();
   /// About the set's up direction and the camera's horizontal axis; never over the poles. A full height is half a turn.
@@ -24,12 +27,17 @@ class OrbitControl {
   /// The camera of a view: for an orthographic one a perspective camera from the same direction. False where there is
   /// none of that index.
   bool jump(std::size_t view);
+  /// A point of the object that is turned about from now on; the eye stays.
+  void set_pivot(Eigen::Vector3d const& p_object) { pivot_ = p_object; }
+  Eigen::Vector3d const& pivot() const { return pivot_; }
 
  private:
   void rotate(Eigen::AngleAxisd const& rotation);
 
-  ScanSet const& set_;
+  Eigen::Vector3d center_;
   OrbitFrame frame_;
+  PathCamera start_;
+  std::vector<PathCamera> views_;
   PathCamera current_;
   Eigen::Vector3d pivot_;
 };

@@ -1,0 +1,80 @@
+#include "viewer/window/commands.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+namespace scanview {
+
+std::optional<Command> command_of_key(int key, WindowMode mode) {
+  auto const into = [&](WindowMode wanted, Command command) { return mode == wanted ? Command::look : command; };
+  switch (key) {
+    case GLFW_KEY_ESCAPE:
+      return mode == WindowMode::look ? Command::quit : Command::look;
+    case GLFW_KEY_H:
+      return Command::help;
+    case GLFW_KEY_TAB:
+      return Command::toggle_panel;
+    case GLFW_KEY_R:
+      return Command::reset;
+    case GLFW_KEY_P:
+      return Command::save_picture;
+    case GLFW_KEY_M:
+      return into(WindowMode::measure, Command::measure);
+    case GLFW_KEY_N:
+      return into(WindowMode::mark, Command::mark);
+    case GLFW_KEY_O:
+      return into(WindowMode::outline, Command::outline);
+    default:
+      break;
+  }
+  if (shows_picture(mode)) {
+    switch (key) {
+      case GLFW_KEY_LEFT:
+      case GLFW_KEY_PAGE_UP:
+        return Command::previous_view;
+      case GLFW_KEY_RIGHT:
+      case GLFW_KEY_PAGE_DOWN:
+        return Command::next_view;
+      case GLFW_KEY_BACKSPACE:
+        return Command::remove_last;
+      default:
+        break;
+    }
+    if (mode == WindowMode::mark && key == GLFW_KEY_UP) return Command::next_point;
+    if (mode == WindowMode::mark && key == GLFW_KEY_DOWN) return Command::previous_point;
+    if (mode == WindowMode::outline && (key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER))
+      return Command::close_outline;
+    return std::nullopt;
+  }
+  if (key == GLFW_KEY_SPACE) return Command::turntable;
+  if (key == GLFW_KEY_K) return Command::add_keyframe;
+  if (mode == WindowMode::measure && key == GLFW_KEY_BACKSPACE) return Command::remove_last;
+  return std::nullopt;
+}
+
+std::optional<std::size_t> view_of_key(int key) {
+  if (key < GLFW_KEY_1 || key > GLFW_KEY_9) return std::nullopt;
+  return static_cast<std::size_t>(key - GLFW_KEY_1);
+}
+
+std::string window_help() {
+  return "left drag: turn\n"
+         "right, middle or shift drag: pan\n"
+         "wheel: nearer, further\n"
+         "double click: the pivot that turning is about\n"
+         "1-9: from the place of a view\n"
+         "space: turntable\n"
+         "R: back to the start\n"
+         "P: save a picture\n"
+         "K: add a keyframe for render --path\n"
+         "M: measure between two clicked points\n"
+         "N: mark points for register --init\n"
+         "O: draw outlines for mesh --marks\n"
+         "Tab: panel on and off\n"
+         "H: this help\n"
+         "Esc: leave a mode; quit\n"
+         "In N and O: left and right change the view, up and down the point, Enter closes an outline, "
+         "Backspace removes the last";
+}
+
+}  // namespace scanview

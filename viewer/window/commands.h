@@ -1,0 +1,50 @@
+#pragma once
+#include <optional>
+#include <string>
+
+namespace scanview {
+
+/// What clicks and drags are for.
+enum class WindowMode {
+  look,     ///< drags turn, a double click sets the pivot
+  measure,  ///< the same; clicks are the ends of a distance
+  mark,     ///< over one view's picture: clicks are numbered points for `register --init`
+  outline,  ///< over one view's picture: clicks are corners of polygons for `mesh --marks`
+};
+
+/// Whether a single view's picture is shown flat instead of the object.
+constexpr bool shows_picture(WindowMode mode) { return mode == WindowMode::mark || mode == WindowMode::outline; }
+
+/// What a key or a button of the panel asks for.
+enum class Command {
+  quit,
+  help,
+  toggle_panel,
+  reset,
+  save_picture,
+  turntable,
+  add_keyframe,
+  remove_keyframe,
+  look,
+  measure,
+  mark,
+  outline,
+  previous_view,
+  next_view,
+  previous_point,
+  next_point,
+  remove_last,
+  close_outline,
+};
+
+/// The command of a key (GLFW's number); nothing where it has none in this mode. M, N and O lead into their modes and,
+/// pressed there, back; Escape leaves a mode before it closes the window.
+std::optional<Command> command_of_key(int key, WindowMode mode);
+
+/// 0 to 8 for the keys 1 to 9.
+std::optional<std::size_t> view_of_key(int key);
+
+/// The mouse and the keys, one a line.
+std::string window_help();
+
+}  // namespace scanview

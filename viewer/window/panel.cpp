@@ -1,0 +1,343 @@
+#include "viewer/window/panel.h"
+
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace scanview {
+namespace {
+
+constexpr float kWidth = 292, kStripHeight = 148;  // units of the screen at the usual size of letters
+
+ImU32 color(Eigen::Vector3f const& rgb, float alpha = 1) {
+  return ImGui::GetColorU32(ImVec4(rgb.x(), rgb.y(), rgb.z(), alpha));
+}
+
+void lines_of(std::vector<std::string> const& lines) {
+  for (auto const& line : lines) ImGui::TextWrapped("%s", line.c_str());
+}
+
+template <typename Choice>
+void radio(char const* label, Choice& current, Choice value) {
+  if (ImGui::RadioButton(label, current == value)) current = value;
+}
+
+void draw_times(PanelContent const& content) {
+  double const total = content.frame_milliseconds + content.panel_milliseconds;
+  ImGui::Text("%.0f frames/s%s%s", total > 0 ? 1000 / total : 0, content.half_resolution ? ", half resolution" : "",
+              content.reading ? ", reading" : "");
+  ImGui::Text("frame %.1f ms, panel %.1f ms", content.frame_milliseconds, content.panel_milliseconds);
+}
+
+void draw_stages(PanelContent const& content) {
+  for (auto const& [name, milliseconds] : content.stages) {
+    ImGui::Bullet();
+    ImGui::Text("%s %.2f ms", name.c_str(), milliseconds);
+  }
+}
+
+void draw_sphere(PanelContent const& content, float scale, PanelAnswer& answer) {
+  SphereInset const& sphere = content.sphere;
+  float const side = 172 * scale, radius = 0.5F * side - 6 * scale;
+  ImVec2 const corner = ImGui::GetCursorScreenPos();
+  ImVec2 const middle(corner.x + 0.5F * ImGui::GetContentRegionAvail().x, corner.y + 0.5F * side);
+  ImGui::InvisibleButton("sphere", ImVec2(std::max(1.0F, ImGui::GetContentRegionAvail().x), side));
+  auto const place = [&](SpherePoint const& p) {
+    return ImVec2(middle.x + radius * static_cast<float>(p.x), middle.y + radius * static_cast<float>(p.y));
+  };
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  list.AddCircleFilled(middle, radius, IM_COL32(30, 34, 40, 255), 64);
+  list.AddCircle(middle, radius, IM_COL32(110, 115, 125, 255), 64);
+  if (sphere.chosen.size() == 3) {
+    list.AddTriangleFilled(place(sphere.chosen[0]), place(sphere.chosen[1]), place(sphere.chosen[2]),
+                           IM_COL32(255, 220, 90, 60));
+  } else {
+    for (auto const& corner_point : sphere.chosen)
+      list.AddLine(place(sphere.eye), place(corner_point), IM_COL32(255, 220, 90, 140));
+  }
+  for (auto const& edge : sphere.edges) {
+    for (std::size_t i = 1; i < edge.arc.size(); ++i) {
+      bool const front = edge.arc[i - 1].front && edge.arc[i].front;
+      list.AddLine(place(edge.arc[i - 1]), place(edge.arc[i]),
+                   edge.chosen ? IM_COL32(255, 220, 90, 255)
+                   : front     ? IM_COL32(150, 160, 175, 220)
+                               : IM_COL32(90, 95, 105, 90),
+                   edge.chosen ? 2.0F : 1.0F);
+    }
+  }
+  for (auto const& dot : sphere.views) {
+    float const alpha = dot.at.front ? 1.0F : 0.35F;
+    float const size = scale * static_cast<float>(dot.drawn ? 3.5 + 3 * dot.weight : 2.5);
+    list.AddCircleFilled(place(dot.at), size,
+                         dot.drawn ? color(view_hue(dot.view), alpha) : color({0.6F, 0.62F, 0.66F}, alpha));
+    if (dot.weight > 0) list.AddCircle(place(dot.at), size + 1, IM_COL32(255, 255, 255, 255));
+  }
+  ImVec2 const eye = place(sphere.eye);
+  list.AddLine(ImVec2(eye.x - 5, eye.y), ImVec2(eye.x + 5, eye.y), IM_COL32(255, 255, 255, 255));
+  list.AddLine(ImVec2(eye.x, eye.y - 5), ImVec2(eye.x, eye.y + 5), IM_COL32(255, 255, 255, 255));
+  if (!ImGui::IsItemHovered()) return;
+  ImVec2 const mouse = ImGui::GetIO().MousePos;
+  std::size_t const view = sphere.nearest((mouse.x - middle.x) / radius, (mouse.y - middle.y) / radius, 0.12);
+  if (view >= content.view_names.size()) return;
+  ImGui::SetTooltip("view %s: click to look from there", content.view_names[view].c_str());
+  if (ImGui::IsItemClicked()) answer.jump = view;
+}
+
+void draw_look(PanelContent& content, PanelAnswer& answer) {
+  Look& look = content.look;
+  bool collage = look.collage;
+  radio("blended", collage, false);
+  ImGui::SameLine();
+  radio("naive collage", collage, true);
+  look.collage = collage;
+  if (!look.collage) {
+    ImGui::Checkbox("soft z", &look.soft_z);
+    ImGui::Text("weights");
+    struct Weight {
+      char const* name;
+      bool Look::*on;
+    };
+    constexpr Weight kWeights[] = {
+        {"place on the sphere", &Look::barycentric}, {"cos of the angle", &Look::cosine}, {"feather", &Look::feather}};
+    for (auto const& weight : kWeights) {
+      ImGui::PushID(weight.name);
+      ImGui::Checkbox(weight.name, &(look.*weight.on));
+      ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize("alone").x - 8);
+      if (ImGui::SmallButton("alone"))
+        for (auto const& other : kWeights) look.*other.on = other.on == weight.on;
+      ImGui::PopID();
+    }
+    ImGui::PushItemWidth(0.45F * ImGui::GetContentRegionAvail().x);
+    if (look.soft_z) {
+      auto threshold = static_cast<float>(look.threshold);
+      auto const greatest = static_cast<float>(content.greatest_threshold);
+      if (ImGui::SliderFloat(fmt::format("threshold ({})", content.unit).c_str(), &threshold, 0, greatest, "%.3g",
+                             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
+        look.threshold = threshold;
+      auto ratio = static_cast<float>(look.reliability_ratio);
+      if (ImGui::SliderFloat("reliability", &ratio, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp))
+        look.reliability_ratio = ratio;
+    }
+    ImGui::PopItemWidth();
+  }
+  ImGui::PushItemWidth(0.45F * ImGui::GetContentRegionAvail().x);
+  ImGui::SliderInt("views that fill", &look.fill_views, 0, 16, "%d", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::PopItemWidth();
+  radio("picture", look.show, SoftZ::Show::picture);
+  ImGui::SameLine();
+  radio("weights", look.show, SoftZ::Show::weights);
+  ImGui::SameLine();
+  radio("which won", look.show, SoftZ::Show::winner);
+  ImGui::Checkbox("wireframe", &look.wireframe);
+  ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize("defaults").x - 8);
+  if (ImGui::SmallButton("defaults")) answer.default_look = true;
+  for (BackEnd const back_end : content.back_ends) {
+    radio(back_end == BackEnd::cpu ? "processor" : "OpenGL", content.back_end, back_end);
+    ImGui::SameLine();
+  }
+  ImGui::TextDisabled("draws");
+}
+
+void draw_mode(PanelContent& content, PanelAnswer& answer) {
+  struct Mode {
+    char const* label;
+    WindowMode mode;
+    Command command;
+  };
+  constexpr Mode kModes[] = {{"turn", WindowMode::look, Command::look},
+                             {"measure (M)", WindowMode::measure, Command::measure},
+                             {"points (N)", WindowMode::mark, Command::mark},
+                             {"outlines (O)", WindowMode::outline, Command::outline}};
+  for (auto const& mode : kModes) {
+    if (ImGui::RadioButton(mode.label, content.mode == mode.mode)) answer.commands.push_back(mode.command);
+    if (mode.mode == WindowMode::look || mode.mode == WindowMode::mark) ImGui::SameLine(120);
+  }
+  if (content.mode == WindowMode::outline) {
+    radio("remove", content.outline, OutlineKind::remove);
+    ImGui::SameLine();
+    radio("keep", content.outline, OutlineKind::keep);
+    ImGui::SameLine();
+    radio("cut", content.outline, OutlineKind::cut);
+    if (ImGui::SmallButton("close (Enter)")) answer.commands.push_back(Command::close_outline);
+  }
+  if (shows_picture(content.mode)) {
+    if (ImGui::SmallButton("< view")) answer.commands.push_back(Command::previous_view);
+    ImGui::SameLine();
+    if (ImGui::SmallButton("view >")) answer.commands.push_back(Command::next_view);
+    ImGui::SameLine();
+  }
+  if (content.mode != WindowMode::look && ImGui::SmallButton("remove last"))
+    answer.commands.push_back(Command::remove_last);
+  lines_of(content.mode_text);
+}
+
+void draw_buttons(PanelContent& content, PanelAnswer& answer) {
+  auto const button = [&](char const* label, Command command, bool same_line = true) {
+    if (ImGui::SmallButton(label)) answer.commands.push_back(command);
+    if (same_line) ImGui::SameLine();
+  };
+  button("reset (R)", Command::reset);
+  button(content.turning ? "stop (space)" : "turntable (space)", Command::turntable, false);
+  button("picture (P)", Command::save_picture);
+  button("help (H)", Command::help, false);
+  button("keyframe (K)", Command::add_keyframe);
+  ImGui::Text("%zu", content.keyframes);
+  if (content.keyframes == 0) return;
+  ImGui::SameLine();
+  button("remove", Command::remove_keyframe, false);
+  ImGui::PushItemWidth(0.35F * ImGui::GetContentRegionAvail().x);
+  ImGui::SliderInt("frames between", &content.frames_between, 1, 240, "%d", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::PopItemWidth();
+  ImGui::TextWrapped("%s", content.keyframe_command.c_str());
+}
+
+void draw_strip(PanelContent const& content, float scale) {
+  float const height = ImGui::GetContentRegionAvail().y - ImGui::GetTextLineHeightWithSpacing();
+  for (auto const& picture : content.strip) {
+    float const width = height * static_cast<float>(picture.width) / static_cast<float>(std::max(1, picture.height));
+    ImGui::BeginGroup();
+    ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(picture.texture)), ImVec2(width, height),
+                 ImVec2(0, 0), ImVec2(1, 1), ImVec4(1, 1, 1, 1),
+                 ImVec4(picture.color.x(), picture.color.y(), picture.color.z(), 1));
+    ImGui::TextUnformatted(picture.caption.c_str());
+    ImGui::EndGroup();
+    ImGui::SameLine(0, 8 * scale);
+  }
+}
+
+void draw_overlay(Overlay const& overlay, ImVec2 const& corner, ImVec2 const& size, float scale) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  list.PushClipRect(corner, ImVec2(corner.x + size.x, corner.y + size.y));
+  auto const place = [&](Eigen::Vector2d const& p) {
+    return ImVec2(corner.x + static_cast<float>(p.x() + 0.5) / scale,
+                  corner.y + static_cast<float>(p.y() + 0.5) / scale);
+  };
+  for (auto const& line : overlay.lines) {
+    std::size_t const count = line.points.size() < 2 ? 0 : line.points.size() - (line.closed ? 0 : 1);
+    for (std::size_t i = 0; i < count; ++i) {
+      ImVec2 const a = place(line.points[i]), b = place(line.points[(i + 1) % line.points.size()]);
+      list.AddLine(a, b, IM_COL32(0, 0, 0, 160), 4);
+      list.AddLine(a, b, color(line.color), 2);
+    }
+  }
+  for (auto const& dot : overlay.dots) {
+    ImVec2 const at = place(dot.at);
+    list.AddCircleFilled(at, 4, IM_COL32(0, 0, 0, 200));
+    list.AddCircleFilled(at, 3, color(dot.color));
+    if (dot.label.empty()) continue;
+    ImVec2 const from(at.x + 8, at.y - 18), text = ImGui::CalcTextSize(dot.label.c_str());
+    list.AddRectFilled(ImVec2(from.x - 3, from.y - 2), ImVec2(from.x + text.x + 3, from.y + text.y + 2),
+                       IM_COL32(0, 0, 0, 180), 3);
+    list.AddText(from, color(dot.color), dot.label.c_str());
+  }
+  list.PopClipRect();
+}
+
+void draw_message(std::string const& message, ImVec2 const& corner, ImVec2 const& size) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  float const width = std::max(1.0F, size.x - 32);
+  ImVec2 const text = ImGui::CalcTextSize(message.c_str(), nullptr, false, width);
+  ImVec2 const from(corner.x + 16, corner.y + size.y - text.y - 16);
+  list.AddRectFilled(ImVec2(from.x - 6, from.y - 4), ImVec2(from.x + text.x + 6, from.y + text.y + 4),
+                     IM_COL32(0, 0, 0, 190), 4);
+  list.AddText(nullptr, 0, from, IM_COL32(235, 235, 235, 255), message.c_str(), nullptr, width);
+}
+
+}  // namespace
+
+struct Panel::State {
+  GlfwWindow& window;
+  float scale = 1;
+};
+
+Panel::Panel(GlfwWindow& window) : state_(std::make_unique<State>(State{window})) {
+  state_->scale = static_cast<float>(window.content_scale());
+  IMGUI_CHECKVERSION();
+  ImGui::CreateContext();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = nullptr;  // leaves no file where it was started
+  io.LogFilename = nullptr;
+  ImGui::StyleColorsDark();
+  ImGui::GetStyle().ScaleAllSizes(state_->scale);
+  ImGui::GetStyle().WindowRounding = 0;
+  ImFontConfig font;
+  font.SizePixels = std::floor(13 * state_->scale);
+  io.Fonts->AddFontDefault(&font);
+  ImGui_ImplGlfw_InitForOpenGL(window.handle(), true);  // calls what the window listens with, too
+  ImGui_ImplOpenGL3_Init("#version 330 core");
+}
+
+Panel::~Panel() {
+  ImGui_ImplOpenGL3_Shutdown();
+  ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext();
+}
+
+bool Panel::takes_keys() const { return visible && ImGui::GetIO().WantTextInput; }
+
+Viewport Panel::viewport(int width, int height, WindowMode mode) const {
+  if (!visible) return {0, 0, width, height};
+  double const pixels = state_->scale * state_->window.pixels_per_unit();
+  // In a small window the picture comes first.
+  int const left = std::min(static_cast<int>(kWidth * pixels), width / 2);
+  int const below = shows_picture(mode) ? 0 : std::min(static_cast<int>(kStripHeight * pixels), height / 4);
+  return {left, 0, std::max(1, width - left), std::max(1, height - below)};
+}
+
+PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport const& viewport) {
+  PanelAnswer answer;
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+  auto const pixels = static_cast<float>(state_->window.pixels_per_unit());
+  ImVec2 const all = ImGui::GetIO().DisplaySize;
+  ImVec2 const corner(static_cast<float>(viewport.x) / pixels, static_cast<float>(viewport.y) / pixels);
+  ImVec2 const size(static_cast<float>(viewport.width) / pixels, static_cast<float>(viewport.height) / pixels);
+  draw_overlay(overlay, corner, size, pixels);
+  if (visible && !content.message.empty()) draw_message(content.message, corner, size);
+  if (visible) {
+    constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                                        ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
+                                        ImGuiWindowFlags_NoBackground;
+    ImGui::SetNextWindowPos(ImVec2(0, 0));
+    ImGui::SetNextWindowSize(ImVec2(corner.x, all.y));
+    ImGui::Begin("panel", nullptr, kFixed & ~ImGuiWindowFlags_NoScrollbar);
+    ImGui::TextWrapped("%s", content.set_name.c_str());
+    draw_times(content);
+    ImGui::Separator();
+    if (!shows_picture(content.mode)) {
+      draw_sphere(content, state_->scale, answer);
+      draw_look(content, answer);
+      ImGui::Separator();
+    }
+    draw_mode(content, answer);
+    ImGui::Separator();
+    draw_buttons(content, answer);
+    if (!content.stages.empty()) {
+      ImGui::Separator();
+      draw_stages(content);
+    }
+    if (!content.failures.empty()) {
+      ImGui::Separator();
+      ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "views that cannot be shown: %zu", content.failures.size());
+      lines_of(content.failures);
+    }
+    ImGui::End();
+    if (size.y < all.y) {
+      ImGui::SetNextWindowPos(ImVec2(corner.x, size.y));
+      ImGui::SetNextWindowSize(ImVec2(all.x - corner.x, all.y - size.y));
+      ImGui::Begin("strip", nullptr, kFixed);
+      draw_strip(content, state_->scale);
+      ImGui::End();
+    }
+  }
+  ImGui::Render();
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  return answer;
+}
+
+}  // namespace scanview
