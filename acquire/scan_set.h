@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "acquire/camera_light.h"
 #include "acquire/range_image.h"
 
 namespace scanview {
@@ -47,6 +48,7 @@ struct ScanSet {
   Eigen::Vector3d center{0, 0, 0};  ///< of the object, in object coordinates: what the view sphere looks at
   std::vector<View> views;
   ErrorBudget error_budget;
+  std::optional<CameraLight> light;  ///< where the views show that it stood still with the camera
 
   bool has_poses() const;  ///< every view has one, and there is at least one view
   /// Radius about `center` that holds 99 % of all depths (thinned): the object's size for tolerances, cameras, spectra.

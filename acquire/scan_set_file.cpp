@@ -179,6 +179,25 @@ View view_from_json(Json const& json, fs::path const& path) {
   return view;
 }
 
+CameraLight light_from_json(Json const& json, fs::path const& path) {
+  CameraLight light;
+  auto const refuse = [&] {
+    throw Error(ErrorCode::bad_input, path,
+                fmt::format("'light' is not {} rows of three finite numbers", CameraLight::kTerms));
+  };
+  if (!json.is_array() || json.size() != CameraLight::kTerms) refuse();
+  for (int k = 0; k < CameraLight::kTerms; ++k) {
+    Json const& row = json[static_cast<std::size_t>(k)];
+    if (!row.is_array() || row.size() != 3) refuse();
+    for (int c = 0; c < 3; ++c) {
+      if (!row[static_cast<std::size_t>(c)].is_number()) refuse();
+      light.coefficients(k, c) = row[static_cast<std::size_t>(c)].get<double>();
+    }
+  }
+  if (!light.coefficients.allFinite()) refuse();
+  return light;
+}
+
 void require_size(cv::Mat const& image, Camera const& camera, fs::path const& path) {
   if (image.cols != camera.width() || image.rows != camera.height())
     throw Error(
@@ -229,6 +248,7 @@ ScanSet read_manifest(fs::path const& given) {
   if (!budget.is_object()) throw Error(ErrorCode::bad_input, path, "error_budget is no object");
   set.error_budget = {error_part(budget, "sampling", path), error_part(budget, "registration", path),
                       error_part(budget, "approximation", path)};
+  if (json.contains("light")) set.light = light_from_json(json["light"], path);
   return set;
 }
 
@@ -242,14 +262,21 @@ void write_manifest(fs::path const& folder, ScanSet const& set) {
          {"color", (view_folder(view.name) / "color.png").generic_string()},
          {"range", (view_folder(view.name) / "range.exr").generic_string()},
          {"gain", to_json(view.gain)}});
-  write_json(folder / "scanset.json", {{"format", kFormat},
-                                       {"unit", to_string(set.unit)},
-                                       {"center", to_json(set.center)},
-                                       {"views", std::move(views)},
-                                       {"error_budget",
-                                        {{"sampling", to_json(set.error_budget.sampling)},
-                                         {"registration", to_json(set.error_budget.registration)},
-                                         {"approximation", to_json(set.error_budget.approximation)}}}});
+  Json manifest = {{"format", kFormat},
+                   {"unit", to_string(set.unit)},
+                   {"center", to_json(set.center)},
+                   {"views", std::move(views)},
+                   {"error_budget",
+                    {{"sampling", to_json(set.error_budget.sampling)},
+                     {"registration", to_json(set.error_budget.registration)},
+                     {"approximation", to_json(set.error_budget.approximation)}}}};
+  if (set.light) {
+    manifest["light"] = Json::array();
+    for (int k = 0; k < CameraLight::kTerms; ++k) {
+      manifest["light"].push_back(to_json(Eigen::Vector3d(set.light->coefficients.row(k).transpose())));
+    }
+  }
+  write_json(folder / "scanset.json", manifest);
 }
 
 ScanSet read_scan_set(fs::path const& folder, Context& context) {

@@ -145,13 +145,25 @@ StageOutcome register_stage(fs::path const& folder, RegisterRequest const& reque
     set.error_budget.registration = alignment.error;
     set.error_budget.approximation = {};  // the meshes' turn comes after this
 
-    auto const gains = request.exposure != 0 ? estimate_gains(set, {}, context)
-                                             : std::vector<Eigen::Vector3d>(set.views.size(), Eigen::Vector3d::Ones());
-    for (std::size_t i = 0; i < set.views.size(); ++i) set.views[i].gain = gains[i];
+    Exposure exposure;
+    exposure.gains.assign(set.views.size(), Eigen::Vector3d::Ones());
+    if (request.exposure != 0) {
+      ExposureOptions how;
+      if (request.exposure == 1) how.light = ExposureOptions::Light::never;
+      exposure = estimate_exposure(set, how, context);
+    }
+    for (std::size_t i = 0; i < set.views.size(); ++i) set.views[i].gain = exposure.gains[i];
+    set.light = exposure.light;
     write_json(folder / "poses.json", {{"initial", initial}, {"registered", poses_json(set)}});
     write_manifest(folder, set);
     AlignmentReview const reviewed = review_alignment(set, before, alignment, context);
     out.figures = figures_of(set, alignment, reviewed);
+    if (request.exposure != 0) {
+      out.figures["exposure"] = {{"rms_before", json_number(exposure.rms_before)},
+                                 {"rms_gains", json_number(exposure.rms_gains)},
+                                 {"rms_light", json_number(exposure.rms_light)},
+                                 {"light_stands_with_camera", exposure.light.has_value()}};
+    }
     if (had_poses) out.figures["moved"] = to_json(compare_poses(set, after, before));
     if (alignment.status == AlignmentStatus::disconnected)
       out.figures["stage_exit"] = static_cast<int>(ErrorCode::partial);

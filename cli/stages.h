@@ -45,7 +45,8 @@ struct RegisterRequest {
   enum class Start { automatic, options, file } start = Start::automatic;  ///< automatic: given poses, else a turntable
   std::filesystem::path pose_file;                                         ///< Start::file
   RegisterOptions options;
-  int exposure = 1;  ///< 1: also bring the views to one exposure (View::gain); 0: all gains 1
+  /// 2: also bring the views to one exposure (View::gain, ScanSet::light); 1: by gains alone; 0: all gains 1.
+  int exposure = 2;
 };
 struct MeshRequest {
   MeshOptions options;

@@ -124,8 +124,9 @@ TEST(HeldOut, ViewsHeldOutTogetherSeeNoneOfTheOthers) {
   auto const renderer = make_cpu_renderer(library);
   renderer->exclude({0, 1, 2});
   auto const frame = renderer->render(scene.set.views[0].image.camera, *scene.set.views[0].object_from_camera);
-  // A quarter of a turn away: half of what the other view sees, and only its rim.
-  EXPECT_NEAR(together[0].views[0].coverage, 0.5, 0.2);
+  // A quarter of a turn away: the lens that the caps of both share, at their rims.
+  EXPECT_GT(together[0].views[0].coverage, 0.1);
+  EXPECT_LT(together[0].views[0].coverage, 0.4);
   EXPECT_NEAR(static_cast<double>(drawn_pixels(frame.color)),
               static_cast<double>(cv::countNonZero(together[0].views[0].drawn)), 200);
 }

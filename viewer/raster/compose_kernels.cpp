@@ -165,6 +165,15 @@ HWY_INLINE Color SampleLayer(ComposedLayer const& layer, std::size_t at, hn::Mas
   sum.r = hn::Mul(sum.r, hn::Set(d, layer.gain[0] * kDecode));
   sum.g = hn::Mul(sum.g, hn::Set(d, layer.gain[1] * kDecode));
   sum.b = hn::Mul(sum.b, hn::Set(d, layer.gain[2] * kDecode));
+  if (layer.samples.lit) {
+    auto const light = hn::IfThenElseZero(hn::RebindMask(du, wanted), hn::LoadU(du, layer.samples.light + at));
+    auto const share = [&](hn::Vec<Words> bits) HWY_ATTR {
+      return hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::And(bits, hn::Set(du, 1023)))), hn::Set(d, 1.0F / 511.5F));
+    };
+    sum.r = hn::Mul(sum.r, share(light));
+    sum.g = hn::Mul(sum.g, share(hn::ShiftRight<10>(light)));
+    sum.b = hn::Mul(sum.b, share(hn::ShiftRight<20>(light)));
+  }
   if (layer.samples.wireframe) {
     auto const line = hn::RebindMask(d, hn::Ne(hn::And(packed, hn::Set(du, 1U << 15)), hn::Zero(du)));
     sum.r = hn::IfThenElse(line, hn::Set(d, layer.hue[0]), sum.r);

@@ -19,6 +19,50 @@ using Floats = hn::CappedTag<float, 8>;
 using Ints = hn::RebindToSigned<Floats>;
 using Words = hn::RebindToUnsigned<Floats>;
 
+/// exp(x) for |x| <= ln 2: a Padé approximation, within 2e-6.
+template <class V>
+HWY_INLINE V SmallExp(V x) {
+  Floats const d;
+  auto const even = hn::Add(hn::Set(d, 1.0F), hn::Mul(hn::Mul(x, x), hn::Set(d, 0.1F)));
+  auto const odd = hn::Mul(x, hn::Add(hn::Set(d, 0.5F), hn::Mul(hn::Mul(x, x), hn::Set(d, 1.0F / 120))));
+  return hn::Div(hn::Add(even, odd), hn::Sub(even, odd));
+}
+
+/// The light at vertices (VertexLight) as this camera would see it, as a share of what the view's camera saw.
+void Relight(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t i, float (*out)[8]) {
+  Floats const d;
+  auto const component = [&](int r) HWY_ATTR {
+    auto const* const m = transform.camera_from_source[r];
+    return hn::Add(hn::Add(hn::Mul(hn::Set(d, m[0]), hn::LoadU(d, &vertices.normal[0][i])),
+                           hn::Mul(hn::Set(d, m[1]), hn::LoadU(d, &vertices.normal[1][i]))),
+                   hn::Mul(hn::Set(d, m[2]), hn::LoadU(d, &vertices.normal[2][i])));
+  };
+  auto x = component(0), y = component(1);
+  // A surface that is seen turns towards the camera; a smoothed normal may not.
+  auto z = hn::Min(component(2), hn::Set(d, -0.1F));
+  auto const length = hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)));
+  auto const scale = hn::Div(hn::Set(d, 1.0F), length);
+  x = hn::Mul(x, scale);
+  y = hn::Mul(y, scale);
+  z = hn::Mul(z, scale);
+  auto const zz = hn::Mul(z, z);
+  decltype(x) const terms[8] = {x,
+                                y,
+                                z,
+                                hn::Mul(x, y),
+                                hn::Mul(y, z),
+                                hn::Mul(x, z),
+                                hn::Sub(hn::Mul(x, x), hn::Mul(y, y)),
+                                hn::Sub(hn::Add(zz, hn::Add(zz, zz)), hn::Set(d, 1.0F))};
+  for (int c = 0; c < 3; ++c) {
+    auto sum = hn::Neg(hn::LoadU(d, &vertices.light[c][i]));
+    for (int k = 0; k < 8; ++k) sum = hn::Add(sum, hn::Mul(hn::Set(d, transform.light[k][c]), terms[k]));
+    constexpr float kMost = 0.6931F;  // ln 2
+    sum = hn::Min(hn::Max(sum, hn::Set(d, -kMost)), hn::Set(d, kMost));
+    hn::Store(SmallExp(sum), d, out[c]);
+  }
+}
+
 void TransformVertices(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t begin,
                        std::size_t end, int width, int height, ScreenVertex* out) {
   Floats const d;
@@ -32,7 +76,7 @@ void TransformVertices(VertexArrays const& vertices, ScreenTransform const& tran
   auto const low = hn::Set(d, -256.0F * kGuardBand), near = hn::Set(d, static_cast<float>(transform.near));
   auto const right = hn::Set(d, 256.0F * static_cast<float>(width + kGuardBand));
   auto const bottom = hn::Set(d, 256.0F * static_cast<float>(height + kGuardBand));
-  HWY_ALIGN float value[4][8];
+  HWY_ALIGN float value[ScreenVertex::kValues][8];
   HWY_ALIGN std::int32_t x[8], y[8];
   for (std::size_t i = begin; i < end; i += lanes) {
     auto const px = hn::LoadU(d, &vertices.x[i]), py = hn::LoadU(d, &vertices.y[i]), pz = hn::LoadU(d, &vertices.z[i]);
@@ -53,9 +97,16 @@ void TransformVertices(VertexArrays const& vertices, ScreenTransform const& tran
     hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[1]);
     hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[2]);
     hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[3]);
+    if (transform.lit) {
+      Relight(vertices, transform, i, &value[ScreenVertex::red]);
+    } else {
+      for (int c = 0; c < 3; ++c) hn::Store(one, d, value[ScreenVertex::red + c]);
+    }
     std::size_t const count = std::min(lanes, end - i);
     for (std::size_t k = 0; k < count; ++k) {
-      out[i + k] = {x[k], y[k], {value[0][k], value[1][k], value[2][k], value[3][k]}};
+      out[i + k].x = x[k];
+      out[i + k].y = y[k];
+      for (int j = 0; j < ScreenVertex::kValues; ++j) out[i + k].values[j] = value[j][k];
     }
   }
 }
@@ -75,9 +126,9 @@ HWY_INLINE V Log2(V x) {
   return hn::Add(exponent, hn::Mul(r, p));
 }
 
-/// What is constant for one triangle: the slopes of key, s, t, w on the screen.
+/// What is constant for one triangle: the slopes of a vertex's values on the screen.
 struct Slopes {
-  float x[4], y[4];
+  float x[ScreenVertex::kValues], y[ScreenVertex::kValues];
 };
 
 class TextureWriter {
@@ -85,6 +136,7 @@ class TextureWriter {
   explicit TextureWriter(TextureTarget const& target) : target_(target) {}
   float* keys() const { return target_.key; }
   bool wants_edges() const { return target_.wireframe; }
+  int values() const { return target_.lit ? ScreenVertex::kValues : ScreenVertex::red; }
 
   template <class M, class V>
   HWY_INLINE void Write(std::size_t at, M mask, V key, float const* base, V lane, Slopes const& slopes,
@@ -118,6 +170,16 @@ class TextureWriter {
     store(target_.key, key);
     store(target_.s, s);
     store(target_.t, t);
+    if (target_.lit) {
+      auto const bits = [&](int k) HWY_ATTR {
+        auto const share = hn::Min(hn::Max(plane(k), hn::Zero(d)), hn::Set(d, 2.0F));
+        return hn::BitCast(du, hn::ConvertTo(di, hn::Add(hn::Mul(share, hn::Set(d, 511.5F)), hn::Set(d, 0.5F))));
+      };
+      auto const light = hn::Or(hn::Or(bits(ScreenVertex::red), hn::ShiftLeft<10>(bits(ScreenVertex::green))),
+                                hn::ShiftLeft<20>(bits(ScreenVertex::blue)));
+      hn::StoreU(hn::IfThenElse(hn::RebindMask(du, mask), light, hn::LoadU(du, target_.light + at)), du,
+                 target_.light + at);
+    }
     hn::StoreU(hn::IfThenElse(hn::RebindMask(du, mask), packed, hn::LoadU(du, target_.packed + at)), du,
                target_.packed + at);
   }
@@ -131,6 +193,7 @@ class IdWriter {
   explicit IdWriter(IdTarget const& target) : target_(target) {}
   float* keys() const { return target_.key; }
   bool wants_edges() const { return false; }
+  int values() const { return ScreenVertex::s; }
 
   template <class M, class V>
   HWY_INLINE void Write(std::size_t at, M mask, V key, float const*, V, Slopes const&, std::uint32_t label, M) const {
@@ -186,8 +249,9 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
   float const scale = 256.0F / static_cast<float>(area2);
   float const a_x = static_cast<float>(a.x) / 256, a_y = static_cast<float>(a.y) / 256;
   Slopes slopes;
-  float at_left[4];
-  for (int k = 0; k < 4; ++k) {
+  float at_left[ScreenVertex::kValues];
+  int const values = writer.values();
+  for (int k = 0; k < values; ++k) {
     float const at_a = a.values[k], d1 = b.values[k] - at_a, d2 = c.values[k] - at_a;
     slopes.x[k] = (d1 * dy2 - d2 * dy1) * scale;
     slopes.y[k] = (d2 * dx1 - d1 * dx2) * scale;
@@ -211,8 +275,8 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
     auto e0 = hn::Add(hn::Set(di, start[0] + step_y[0] * down), step0);
     auto e1 = hn::Add(hn::Set(di, start[1] + step_y[1] * down), step1);
     auto e2 = hn::Add(hn::Set(di, start[2] + step_y[2] * down), step2);
-    float base[4];
-    for (int k = 0; k < 4; ++k) base[k] = at_left[k] + slopes.y[k] * (static_cast<float>(y) - a_y);
+    float base[ScreenVertex::kValues];
+    for (int k = 0; k < values; ++k) base[k] = at_left[k] + slopes.y[k] * (static_cast<float>(y) - a_y);
     auto lane = hn::Iota(d, 0);  // pixels from `left`: exact, so that sums do not depend on the vector's width
     std::size_t at = static_cast<std::size_t>((y - area.top) * kTileStride + (left - area.left));
     for (int x = left; x <= right; x += lanes) {

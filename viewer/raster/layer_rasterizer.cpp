@@ -88,16 +88,19 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
       tile.targets_.resize(layers.size());
       while (tile.words_.size() < layers.size()) {
         tile.floats_.emplace_back(3 * kTilePixels);
-        tile.words_.emplace_back(kTilePixels);
+        tile.words_.emplace_back(2 * kTilePixels);
       }
       for (std::size_t i = 0; i < layers.size(); ++i) {
         float* const floats = tile.floats_[i].data();
+        std::uint32_t* const words = tile.words_[i].data();
         tile.targets_[i] = {floats,
                             floats + kTilePixels,
                             floats + 2 * kTilePixels,
-                            tile.words_[i].data(),
+                            words,
+                            words + kTilePixels,
                             layers[i].largest_lod,
-                            layers[i].wireframe};
+                            layers[i].wireframe,
+                            layers[i].transform.lit};
       }
       compose(tile);
     });

@@ -14,7 +14,7 @@ namespace scanview {
 /// texels, divided by z.
 struct ScreenVertex {
   std::int32_t x, y;
-  enum Value { key, s, t, w, kValues };
+  enum Value { key, s, t, w, red, green, blue, kValues };
   float values[kValues];
 };
 inline constexpr std::int32_t kBeyond = INT32_MIN;
@@ -26,12 +26,16 @@ struct ScreenTransform {
   double rows[kRows][4] = {};
   bool perspective = true;  ///< whether w is the depth (else 1)
   double near = 0;          ///< perspective: nothing nearer is drawn
+  bool lit = false;         ///< whether there is a light (CameraLight), and the mesh has normals
+  float camera_from_source[3][3] = {};
+  float light[8][3] = {};  ///< CameraLight::coefficients
 };
 
 /// Vertices of a mesh a component an array, padded so that whole vectors can be read.
 struct VertexArrays {
   std::size_t count = 0;
   std::vector<float> x, y, z;
+  std::vector<float> normal[3], light[3];  ///< VertexLight; or empty
 };
 
 /// Triangles wider or higher than this many pixels beyond the picture are clipped (guard band); pictures are drawn in
@@ -59,8 +63,10 @@ struct TextureTarget {
   float* s;
   float* t;
   std::uint32_t* packed;
+  std::uint32_t* light;  ///< red, green, blue in 10 bits each (red lowest), 1023: twice as much; only if `lit`
   float largest_lod = 0;
   bool wireframe = false;
+  bool lit = false;
 };
 struct IdTarget {
   float* key;

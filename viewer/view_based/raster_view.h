@@ -16,13 +16,14 @@ namespace scanview {
 class RasterView {
  public:
   /// `picture`: padded_texture() of the view.
-  RasterView(View const& view, ViewMesh const& view_mesh, cv::Mat3b const& picture);
+  RasterView(View const& view, ViewMesh const& view_mesh, cv::Mat3b const& picture,
+             std::optional<CameraLight> const& light);
   RasterMesh const& mesh() const { return mesh_; }
   RasterTexture const& texture() const { return texture_; }
   Eigen::Vector3f const& gain() const { return gain_; }
-  /// False where all of the view lies behind the camera.
+  /// False where all of the view lies behind the camera. `relight`: as far as there is a CameraLight.
   bool transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera,
-                    ScreenTransform& transform) const;
+                    bool relight, ScreenTransform& transform) const;
   PicturePlace place(Camera const& camera, Eigen::Isometry3d const& object_from_camera) const {
     return picture_place(camera_, area_, object_from_camera_.inverse() * object_from_camera, camera);
   }
@@ -32,6 +33,7 @@ class RasterView {
   Eigen::Isometry3d object_from_camera_;
   Eigen::Vector3f gain_;
   Eigen::AlignedBox3d bounds_;
+  std::optional<CameraLight> light_;
   cv::Rect area_;
   RasterMesh mesh_;
   RasterTexture texture_;

@@ -31,6 +31,7 @@ struct ViewBasedOptions {
   enum class Visibility { soft_z, nearest } visibility = Visibility::soft_z;
   /// picture; or in false colour how much each view counts in a pixel; or which view counts most. Colours: view_hue().
   SoftZ::Show show = SoftZ::Show::picture;
+  bool relight = true;     ///< where the set has a CameraLight: as if it stood with this camera as it did with the views'
   bool wireframe = false;  ///< the triangles' edges over the picture, in their views' colours
   void validate() const;
 };
