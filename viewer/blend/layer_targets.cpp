@@ -25,6 +25,10 @@ void LayerTargets::resize(int width, int height, int layers) {
   gl_.BindTexture(GL_TEXTURE_2D_ARRAY, samples_.name());
   gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA32F, width, height, layers, 0, GL_RGBA, GL_FLOAT, nullptr);
   nearest(GL_TEXTURE_2D_ARRAY);
+  light_ = GlTexture(gl_);
+  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, light_.name());
+  gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA16F, width, height, layers, 0, GL_RGBA, GL_FLOAT, nullptr);
+  nearest(GL_TEXTURE_2D_ARRAY);
   depth_buffer_ = GlTexture(gl_);
   gl_.BindTexture(GL_TEXTURE_2D, depth_buffer_.name());
   gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, width, height, 0, GL_DEPTH_COMPONENT, GL_FLOAT, nullptr);
@@ -41,8 +45,9 @@ void LayerTargets::resize(int width, int height, int layers) {
 void LayerTargets::begin_layer(int layer) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
   gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, samples_.name(), 0, layer);
-  GLenum const buffers[] = {GL_COLOR_ATTACHMENT0};
-  gl_.DrawBuffers(1, buffers);
+  gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT1, light_.name(), 0, layer);
+  GLenum const buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+  gl_.DrawBuffers(2, buffers);
   if (gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
     throw Error(ErrorCode::io, {}, "OpenGL cannot draw into float textures here");
   }

@@ -16,9 +16,12 @@ struct LayerWeight {
 /// Which of several views' samples of a pixel are seen, and how they are mixed (Pulli 1997, soft z-buffering, carried
 /// on). Two back ends compute it: SoftZCompositor on OpenGL, the tiles of viewer/raster.
 ///
-/// Sample i has depth z, quality q = w_cos · w_feather (at least kLeastQuality) and fairness f, rising from 0 at a
-/// feather of kFairFeather to 1 at twice that: the last fringe of a mesh hangs from the true outline. Its rank is
-/// r = (weight + fill_rank · f) · q. With hide(d) rising from 0 at d = threshold to 1 at d = 1.5 threshold:
+/// Sample i has depth z, quality q = w_cos · w_near · √w_feather (at least kLeastQuality) and fairness f, rising from 0
+/// at a feather of kFairFeather to 1 at twice that: the last fringe of a mesh hangs from the true outline. w_near =
+/// 1 / (1 + (θ / (kNearSpacings · spacing))²), θ the angle at the surface between the rays to the eye and to the view's
+/// camera, spacing that of neighbouring views: seen from inside, directions from the centre say little. The root of the
+/// feather (the paper's is linear) hides borders as well and wastes less of the views: + 0.1 to 0.5 dB on held-out
+/// views. Its rank is r = (weight + fill_rank · f) · q. With hide(d) rising from 0 at d = threshold to 1 at d = 1.5 threshold:
 ///   reliable(i) = 1 − max over j of hide(z_j − z_i) · low(r_i / (ratio · r_j)), low falling from 1 at ½ to 0 at 1:
 ///                 a low-rank sample in front of a much higher one further behind is ignored;
 ///   seen(k)     = reliable(k) · (1 − max over i of reliable(i) · hide(z_k − z_i)): what lies behind a reliable sample
@@ -39,8 +42,8 @@ struct SoftZ {
   static constexpr double kGoodEnough = 0.3;     ///< where the main views' goodness reaches it, nothing fills
   static constexpr double kGoodAtZero = 0.35;    ///< goodness of a sample with q = 0
   static constexpr double kGoodQuality = 0.1;    ///< q that adds 1 to it
-  static constexpr double kFairFeather = 0.03;   ///< what only fills counts from this feather on, fully from twice as
-                                                 ///< much: the last fringe of a mesh hangs from the true outline
+  static constexpr double kFairFeather = 0.02;   ///< what only fills counts from this feather on, fully from twice it
+  static constexpr double kNearSpacings = 2;
   static constexpr double kLeastQuality = 1e-4;  ///< a view that is alone at its border still shows
   double threshold = 0;                          ///< >= 0, may be infinite
   double reliability_ratio = 0.1;

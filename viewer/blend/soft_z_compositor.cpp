@@ -22,6 +22,7 @@ void main() {
 // SoftZ for one pixel; then what layer `current` adds to it.
 constexpr char kAddShader[] = R"(
 uniform sampler2DArray samples;
+uniform sampler2DArray light;
 uniform int layer_count;
 uniform float layer_weight[MAX_LAYERS];
 uniform float layer_fill[MAX_LAYERS];
@@ -111,7 +112,8 @@ void main() {
   if (show == 0 && lod >= 0.0) {
     vec3 place = vec3(vec2(pixel), 1.0);
     vec3 texel = depth * (along * place) + at * place;
-    color = gain * textureLod(picture, texel.xy / (texel.z * size), lod).rgb;
+    color = gain * texelFetch(light, ivec3(pixel, current), 0).rgb *
+            textureLod(picture, texel.xy / (texel.z * size), lod).rgb;
   }
   sum = share[mine] * vec4(color, 1.0);
   sum_depth = share[mine] * z[mine];
@@ -241,6 +243,9 @@ Frame SoftZCompositor::compose(LayerTargets const& layers, std::vector<LayerWeig
   gl_.BindTexture(GL_TEXTURE_2D_ARRAY, layers.samples());
   gl_.Uniform1i(add_.uniform("samples"), 0);
   gl_.Uniform1i(add_.uniform("picture"), 1);
+  gl_.ActiveTexture(GL_TEXTURE2);
+  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, layers.light());
+  gl_.Uniform1i(add_.uniform("light"), 2);
   set_weights(weights, soft_z);
   gl_.ActiveTexture(GL_TEXTURE1);
   for (std::size_t i = 0; i < pictures.size(); ++i) {

@@ -14,12 +14,13 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kAllAlike = std::numeric_limits<double>::infinity();  ///< no nearness: the penalty does that here
+
 class LumigraphRenderer final : public HeldOutRenderer {
  public:
   LumigraphRenderer(std::shared_ptr<ViewLibrary> library, LumigraphOptions const& options)
       : library_(library), options_(options), rasterizer_(0), views_(library) {
-    if (options_.threshold < 0) options_.threshold = library_->set().error_budget.threshold();
-    if (!(options_.threshold > 0) && options.threshold < 0) options_.threshold = 0.01 * library_->radius();
+    if (options_.threshold < 0) options_.threshold = default_threshold(*library_);
     exclude({});
   }
 
@@ -41,7 +42,7 @@ class LumigraphRenderer final : public HeldOutRenderer {
     for (std::size_t const view : used_) {
       RasterView const* const raster = views_.get(view, true);
       LayerRasterizer::Layer layer;
-      if (raster == nullptr || !raster->transform_to(camera, object_from_camera, false, layer.transform)) continue;
+      if (raster == nullptr || !raster->transform_to(camera, object_from_camera, kAllAlike, false, layer.transform)) continue;
       layer.mesh = &raster->mesh();
       layer.largest_lod = static_cast<float>(raster->texture().levels.size() - 1);
       layers.push_back(layer);

@@ -82,7 +82,7 @@ void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea
       auto const feather = hn::Mul(mix(upper, lower, taps.down), hn::Set(d, 1.0F / 255));
       if (layer.feather) quality = hn::Mul(quality, feather);
       hn::StoreU(hn::IfThenElseZero(drawn, Clamp(quality, how.least_weight, 1.0F)), d, layer.quality + at);
-      auto const fairness = hn::Sub(hn::Mul(feather, hn::Set(d, 1.0F / how.fair_feather)), hn::Set(d, 1.0F));
+      auto const fairness = hn::Sub(hn::Mul(hn::Mul(feather, feather), hn::Set(d, 1.0F / how.fair_feather)), hn::Set(d, 1.0F));
       hn::StoreU(hn::IfThenElseZero(drawn, Clamp(fairness, 0.0F, 1.0F)), d, layer.fairness + at);
     }
   }

@@ -28,6 +28,28 @@ HWY_INLINE V SmallExp(V x) {
   return hn::Div(hn::Add(even, odd), hn::Sub(even, odd));
 }
 
+/// How close the view's camera comes to seeing a point from the side this camera does. 2 − 2 cos θ is θ² for small
+/// angles.
+template <class V>
+HWY_INLINE V Nearness(ScreenTransform const& transform, V x, V y, V z) {
+  Floats const d;
+  auto const one = hn::Set(d, 1.0F);
+  auto const length = [&](V a, V b, V c) HWY_ATTR {
+    return hn::Sqrt(hn::Add(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Mul(c, c)));
+  };
+  auto const sx = hn::Set(d, transform.source[0]), sy = hn::Set(d, transform.source[1]),
+             sz = hn::Set(d, transform.source[2]);
+  auto const vx = transform.source_far ? sx : hn::Sub(sx, x), vy = transform.source_far ? sy : hn::Sub(sy, y),
+             vz = transform.source_far ? sz : hn::Sub(sz, z);
+  auto const ex = transform.perspective ? hn::Neg(x) : hn::Zero(d), ey = transform.perspective ? hn::Neg(y) : hn::Zero(d),
+             ez = transform.perspective ? hn::Neg(z) : hn::Set(d, -1.0F);
+  auto const to_view = length(vx, vy, vz), to_eye = length(ex, ey, ez);
+  auto const product = hn::Max(hn::Mul(to_view, to_eye), hn::Set(d, 1e-30F));
+  auto const cosine = hn::Div(hn::Add(hn::Add(hn::Mul(vx, ex), hn::Mul(vy, ey)), hn::Mul(vz, ez)), product);
+  auto const squared_angle = hn::Max(hn::Zero(d), hn::Sub(hn::Set(d, 2.0F), hn::Add(cosine, cosine)));
+  return hn::Div(one, hn::Add(one, hn::Mul(squared_angle, hn::Set(d, transform.angle_scale))));
+}
+
 /// The light at vertices (VertexLight) as this camera would see it, as a share of what the view's camera saw.
 void Relight(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t i, float (*out)[8]) {
   Floats const d;
@@ -97,6 +119,9 @@ void TransformVertices(VertexArrays const& vertices, ScreenTransform const& tran
     hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[1]);
     hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[2]);
     hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[3]);
+    hn::Store(Nearness(transform, row(ScreenTransform::x_camera), row(ScreenTransform::y_camera),
+                       row(ScreenTransform::depth)),
+              d, value[ScreenVertex::nearness]);
     if (transform.lit) {
       Relight(vertices, transform, i, &value[ScreenVertex::red]);
     } else {
@@ -148,7 +173,9 @@ class TextureWriter {
                            HWY_ATTR { return hn::Add(hn::Set(d, base[k]), hn::Mul(hn::Set(d, slopes.x[k]), lane)); };
     auto const inverse = hn::Div(hn::Set(d, 1.0F), plane(3));
     auto const s = hn::Mul(plane(1), inverse), t = hn::Mul(plane(2), inverse);
-    auto packed = hn::Set(du, label << 16);
+    auto const cosine = hn::Mul(plane(ScreenVertex::nearness), hn::Set(d, static_cast<float>(label)));
+    auto packed = hn::ShiftLeft<16>(hn::BitCast(
+        du, hn::ConvertTo(di, hn::Min(hn::Max(hn::Add(cosine, hn::Set(d, 0.5F)), hn::Zero(d)), hn::Set(d, 65535.0F)))));
     if (target_.largest_lod > 0) {
       auto const slope = [&](float of_value, float of_w, V value)
                              HWY_ATTR { return hn::Sub(hn::Set(d, of_value), hn::Mul(value, hn::Set(d, of_w))); };

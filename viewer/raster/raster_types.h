@@ -14,18 +14,23 @@ namespace scanview {
 /// texels, divided by z.
 struct ScreenVertex {
   std::int32_t x, y;
-  enum Value { key, s, t, w, red, green, blue, kValues };
+  enum Value { key, s, t, w, nearness, red, green, blue, kValues };
   float values[kValues];
 };
 inline constexpr std::int32_t kBeyond = INT32_MIN;
 
 /// Rows of the map from source coordinates (x, y, z, 1): position on the screen u w, v w, w (pixels, centre of pixel
-/// (0, 0) at 0), homogeneous texture coordinates s w', t w', w' (texels), and the depth z.
+/// (0, 0) at 0), homogeneous texture coordinates s w', t w', w' (texels), and the point in the camera's coordinates, of which depth is
+/// z.
 struct ScreenTransform {
-  enum Row { u, v, w, s, t, texture_w, depth, kRows };
+  enum Row { u, v, w, s, t, texture_w, x_camera, y_camera, depth, kRows };
   double rows[kRows][4] = {};
   bool perspective = true;  ///< whether w is the depth (else 1)
   double near = 0;          ///< perspective: nothing nearer is drawn
+  /// Where the view's camera stands, in this camera's coordinates; `source_far`: infinitely far in that direction.
+  float source[3] = {};
+  bool source_far = false;
+  float angle_scale = 0;  ///< nearness = 1 / (1 + angle_scale θ²)
   bool lit = false;         ///< whether there is a light (CameraLight), and the mesh has normals
   float camera_from_source[3][3] = {};
   float light[8][3] = {};  ///< CameraLight::coefficients

@@ -12,8 +12,8 @@ namespace {
 constexpr std::size_t kVertexPart = 8192, kTrianglePart = 8192;
 constexpr std::uint32_t kClipped = 1U << 31;
 
-/// The rows of the transform, then the light.
-using ClipVertex = std::array<double, ScreenTransform::kRows + 3>;
+/// The rows of the transform, then nearness and light.
+using ClipVertex = std::array<double, ScreenTransform::kRows + 4>;
 
 ClipVertex between(ClipVertex const& a, ClipVertex const& b, double t) {
   ClipVertex v;
@@ -43,7 +43,8 @@ ScreenVertex on_screen(ClipVertex const& v, bool perspective) {
           static_cast<std::int32_t>(std::lround(256 * v[Row::v] * inverse)),
           {perspective ? static_cast<float>(inverse) : static_cast<float>(-v[Row::depth]), attribute(Row::s),
            attribute(Row::t), attribute(Row::texture_w), static_cast<float>(v[Row::kRows]),
-           static_cast<float>(v[Row::kRows + 1]), static_cast<float>(v[Row::kRows + 2])}};
+           static_cast<float>(v[Row::kRows + 1]), static_cast<float>(v[Row::kRows + 2]),
+           static_cast<float>(v[Row::kRows + 3])}};
 }
 
 }  // namespace
@@ -113,7 +114,7 @@ void TriangleBins::clip(Part& part, std::size_t triangle) const {
       double const* const row = transform_.rows[r];
       v[r] = row[0] * points.x[i] + row[1] * points.y[i] + row[2] * points.z[i] + row[3];
     }
-    for (std::size_t c = 0; c < 3; ++c) v[Row::kRows + c] = vertices_[i].values[ScreenVertex::red + c];
+    for (std::size_t c = 0; c < 4; ++c) v[Row::kRows + c] = vertices_[i].values[ScreenVertex::nearness + c];
     polygon.push_back(v);
   }
   double const near = transform_.near;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/median.h"
+
 namespace scanview {
 
 using Eigen::Vector3d;
@@ -43,6 +45,19 @@ std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main, std::v
   }
   std::erase_if(all, [](UsedView const& view) { return view.weight <= 0 && view.fill <= 0; });
   return all;
+}
+
+double median_spacing(std::vector<Vector3d> const& directions) {
+  std::vector<double> nearest;
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    double least = std::numbers::pi;
+    for (std::size_t j = 0; j < directions.size(); ++j) {
+      if (j == i) continue;
+      least = std::min(least, std::atan2(directions[i].cross(directions[j]).norm(), directions[i].dot(directions[j])));
+    }
+    nearest.push_back(std::max(least, 1e-3));
+  }
+  return median(std::move(nearest));
 }
 
 double fill_rank(std::vector<UsedView> const& views) {

@@ -27,6 +27,10 @@ std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main,
                                      std::vector<Eigen::Vector3d> const& directions, Eigen::Vector3d const& eye,
                                      int fill_views);
 
+/// Median angle between a direction and its nearest neighbour, radians; π where there is one direction only. Coinciding
+/// ones count as a milliradian apart.
+double median_spacing(std::vector<Eigen::Vector3d> const& directions);
+
 /// How much `fill` counts where it is decided what hides what: fully where the eye is between views, hardly where it is
 /// at one, which has seen itself what is nearest there.
 double fill_rank(std::vector<UsedView> const& views);

@@ -62,7 +62,7 @@ class CpuRenderer final : public ViewBasedRenderer {
     for (auto const& view : used) {
       RasterView const& raster = *views_.get(view.view, true);
       LayerRasterizer::Layer layer;
-      if (!raster.transform_to(camera, object_from_camera, options().relight, layer.transform)) continue;
+      if (!raster.transform_to(camera, object_from_camera, spacing(), options().relight, layer.transform)) continue;
       layer.mesh = &raster.mesh();
       layer.largest_lod = static_cast<float>(raster.texture().levels.size() - 1);
       layer.wireframe = options().wireframe;

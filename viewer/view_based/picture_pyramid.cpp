@@ -69,7 +69,16 @@ PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mes
   PicturePyramid pyramid;
   pyramid.area = area_under(view_mesh);
   pyramid.levels.push_back(padded(pyramid.area).clone());
-  pyramid.feather = view_mesh.feather(pyramid.area).clone();
+  pyramid.feather.create(pyramid.area.size());
+  std::array<std::uint8_t, 256> root{};
+  for (std::size_t i = 0; i < root.size(); ++i) {
+    root[i] = static_cast<std::uint8_t>(std::lround(std::sqrt(255.0 * static_cast<double>(i))));
+  }
+  for (int y = 0; y < pyramid.area.height; ++y) {
+    for (int x = 0; x < pyramid.area.width; ++x) {
+      pyramid.feather(y, x) = root[view_mesh.feather(pyramid.area.y + y, pyramid.area.x + x)];
+    }
+  }
   cv::Mat3f linear = linear_light(pyramid.levels.front());
   while (linear.rows > 1 || linear.cols > 1) {
     cv::Mat3f half;

@@ -12,7 +12,7 @@ namespace scanview {
 struct PicturePyramid {
   cv::Rect area;  ///< with a pixel around the mesh, inside the picture
   std::vector<cv::Mat3b> levels;
-  cv::Mat1b feather;  ///< of `area`
+  cv::Mat1b feather;  ///< of `area`: the square root of the view's, 255 is 1
 };
 
 /// `padded`: padded_texture() of the view.

@@ -1,5 +1,6 @@
 #include "viewer/view_based/raster_view.h"
 
+#include "viewer/blend/soft_z.h"
 #include "viewer/raster/raster_texture.h"
 #include "viewer/view_based/vertex_light.h"
 #include "viewer/view_based/view_transform.h"
@@ -29,8 +30,8 @@ RasterView::RasterView(View const& view, ViewMesh const& view_mesh, cv::Mat3b co
   }
 }
 
-bool RasterView::transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera, bool relight,
-                              ScreenTransform& transform) const {
+bool RasterView::transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera, double spacing,
+                              bool relight, ScreenTransform& transform) const {
   // In double precision: the two poses may be far from the origin, their difference is not.
   Eigen::Isometry3d const camera_from_source = object_from_camera.inverse() * object_from_camera_;
   DepthRange range;
@@ -42,6 +43,11 @@ bool RasterView::transform_to(Camera const& camera, Eigen::Isometry3d const& obj
     transform.rows[ScreenTransform::t][c] = texture(1, c);
     transform.rows[ScreenTransform::texture_w][c] = texture(2, c);
   }
+  Eigen::Vector3d const source = camera_.is_perspective() ? Eigen::Vector3d(camera_from_source.translation())
+                                                          : Eigen::Vector3d(-camera_from_source.linear().col(2));
+  for (int c = 0; c < 3; ++c) transform.source[c] = static_cast<float>(source[c]);
+  transform.source_far = !camera_.is_perspective();
+  transform.angle_scale = static_cast<float>(1 / (SoftZ::kNearSpacings * SoftZ::kNearSpacings * spacing * spacing));
   transform.lit = relight && light_;
   if (transform.lit) {
     for (int r = 0; r < 3; ++r) {

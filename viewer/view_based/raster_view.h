@@ -21,9 +21,10 @@ class RasterView {
   RasterMesh const& mesh() const { return mesh_; }
   RasterTexture const& texture() const { return texture_; }
   Eigen::Vector3f const& gain() const { return gain_; }
-  /// False where all of the view lies behind the camera. `relight`: as far as there is a CameraLight.
+  /// False where all of the view lies behind the camera. `spacing`: typical angle between neighbouring views, radians
+  /// (infinite: all directions are alike); `relight`: as far as there is a CameraLight.
   bool transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera,
-                    bool relight, ScreenTransform& transform) const;
+                    double spacing, bool relight, ScreenTransform& transform) const;
   PicturePlace place(Camera const& camera, Eigen::Isometry3d const& object_from_camera) const {
     return picture_place(camera_, area_, object_from_camera_.inverse() * object_from_camera, camera);
   }

@@ -17,6 +17,11 @@ void ViewBasedOptions::validate() const {
   if (fill_views < 0 || fill_views > 16) throw Error(ErrorCode::usage, {}, "fill_views must be between 0 and 16");
 }
 
+double default_threshold(ViewLibrary const& library) {
+  double const budget = library.set().error_budget.threshold();
+  return budget > 0 ? 2 * budget : 0.01 * library.radius();
+}
+
 Eigen::Vector3f view_hue(std::size_t view) {
   // Turns by the golden angle, so that neighbours and their neighbours differ.
   constexpr double kGolden = 0.61803398874989;
@@ -41,8 +46,7 @@ ViewBasedRenderer::ViewBasedRenderer(std::shared_ptr<ViewLibrary> library, ViewB
 void ViewBasedRenderer::set_options(ViewBasedOptions const& options) {
   options.validate();
   auto used = options;
-  if (used.threshold < 0) used.threshold = library_->set().error_budget.threshold();
-  if (!(used.threshold > 0) && options.threshold < 0) used.threshold = 0.01 * library_->radius();
+  if (used.threshold < 0) used.threshold = default_threshold(*library_);
   exclude(used.excluded);
   options_ = std::move(used);
 }
@@ -60,6 +64,7 @@ void ViewBasedRenderer::exclude(std::vector<std::size_t> const& excluded) {
   options_.excluded = excluded;
   if (sphere_ && used == used_) return;
   sphere_.emplace(directions);
+  spacing_ = median_spacing(directions);
   used_ = std::move(used);
   used_directions_ = std::move(directions);
 }

@@ -15,13 +15,13 @@ namespace scanview {
 
 struct ViewBasedOptions {
   /// Soft z: samples within this depth of the nearest reliable one are averaged (units); weights ramp to zero at 1.5
-  /// times it. Negative: from the set's error budget, and where that knows nothing 1 % of the set's radius.
+  /// times it. Negative: default_threshold().
   double threshold = -1;
   /// A sample whose weight is below this share of one further away does not hide it (Pulli 1997: "a low confidence
   /// pixel in front of a high confidence one is ignored").
   double reliability_ratio = 0.1;
   /// Views beyond the three that fill what these do not see (soft_z.h); 0: the paper's three only. At most 16.
-  int fill_views = 4;
+  int fill_views = 12;
   /// Views that are not used (held out).
   std::vector<std::size_t> excluded;
 
@@ -35,6 +35,10 @@ struct ViewBasedOptions {
   bool wireframe = false;  ///< the triangles' edges over the picture, in their views' colours
   void validate() const;
 };
+
+/// Twice what the set's error budget expects of one surface, since two views may be off to either side; where it knows
+/// nothing 1 % of the set's radius. Units.
+double default_threshold(ViewLibrary const& library);
 
 /// The false colour of a view, R G B in linear light: far apart for neighbouring indices.
 Eigen::Vector3f view_hue(std::size_t view);
@@ -78,6 +82,8 @@ class ViewBasedRenderer : public Renderer {
   virtual bool ready(std::size_t view, bool wait) = 0;
 
   SoftZ soft_z() const;
+  /// Median angle between a used view and its nearest neighbour, from the centre; radians.
+  double spacing() const { return spacing_; }
 
   std::map<std::string, double> stages_;
 
@@ -87,6 +93,7 @@ class ViewBasedRenderer : public Renderer {
   std::vector<Eigen::Vector3d> directions_, used_directions_;  ///< of all views; of those that are used
   std::vector<std::size_t> used_;
   std::optional<ViewSphere> sphere_;
+  double spacing_ = 1;
   mutable std::size_t last_face_ = 0;
   bool patient_ = true, complete_ = true;
 };

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "viewer/view_based/vertex_light.h"
 #include "viewer/view_based/view_transform.h"
 
 namespace scanview {
@@ -17,17 +18,45 @@ using Eigen::Vector4d;
 
 constexpr char kVertexShader[] = R"(#version 330 core
 layout(location = 0) in vec3 p_source;
+layout(location = 1) in vec3 normal;       // VertexLight
+layout(location = 2) in vec3 logarithm;
 uniform mat4 clip_from_source;
+uniform mat4 camera_from_source;
+uniform vec3 source;               // the view's camera, in this camera's coordinates
+uniform bool source_far;           // infinitely far in that direction
+uniform bool perspective;
+uniform float angle_scale;
+uniform bool lit;
+uniform vec3 light[8];             // CameraLight::coefficients
 uniform mat4 sample_from_source;   // rows: s w, t w, w (texture coordinates), depth in the rendering camera
 out vec4 texture_and_depth;
+noperspective out float nearness;
+noperspective out vec3 relight;
+
 void main() {
   gl_Position = clip_from_source * vec4(p_source, 1.0);
   texture_and_depth = sample_from_source * vec4(p_source, 1.0);
+  vec3 p = (camera_from_source * vec4(p_source, 1.0)).xyz;
+  vec3 to_view = source_far ? source : source - p;
+  vec3 to_eye = perspective ? -p : vec3(0.0, 0.0, -1.0);
+  float cosine = dot(to_view, to_eye) / max(length(to_view) * length(to_eye), 1e-30);
+  nearness = 1.0 / (1.0 + angle_scale * max(0.0, 2.0 - 2.0 * cosine));
+  relight = vec3(1.0);
+  if (lit) {
+    vec3 n = mat3(camera_from_source) * normal;
+    n = normalize(vec3(n.xy, min(n.z, -0.1)));
+    vec3 sum = -logarithm + light[0] * n.x + light[1] * n.y + light[2] * n.z + light[3] * n.x * n.y +
+               light[4] * n.y * n.z + light[5] * n.x * n.z + light[6] * (n.x * n.x - n.y * n.y) +
+               light[7] * (3.0 * n.z * n.z - 1.0);
+    relight = exp(clamp(sum, -0.6931, 0.6931));
+  }
 }
 )";
 
 constexpr char kFragmentShader[] = R"(#version 330 core
 in vec4 texture_and_depth;
+noperspective in float nearness;
+noperspective in vec3 relight;
 uniform sampler2D feather;
 uniform samplerBuffer cos_phi;
 uniform vec2 size;                 // of the picture
@@ -36,6 +65,7 @@ uniform float use_cosine, use_feather;
 uniform float largest_lod;
 uniform bool line;                 // of a wireframe
 layout(location = 0) out vec4 sample_of_view;   // depth, quality, fairness, level of detail (-1: a line)
+layout(location = 1) out vec4 light_of_view;
 
 // Spelled out, because drivers filter 8-bit textures with few bits.
 float feather_at(vec2 st) {
@@ -54,9 +84,12 @@ void main() {
   vec2 along_x = dFdx(st) * size, along_y = dFdy(st) * size;
   float lod = 0.5 * log2(max(max(dot(along_x, along_x), dot(along_y, along_y)), 1.0));
   float edge = feather_at(st);
-  float quality = mix(1.0, texelFetch(cos_phi, gl_PrimitiveID).r, use_cosine) * mix(1.0, edge, use_feather);
+  // In 16 bits, as the rasteriser keeps it.
+  float near_cosine = floor(nearness * texelFetch(cos_phi, gl_PrimitiveID).r * 65535.0 + 0.5) / 65535.0;
+  float quality = mix(1.0, near_cosine, use_cosine) * mix(1.0, edge, use_feather);
   sample_of_view = vec4(texture_and_depth.w, clamp(quality, least_weight, 1.0),
-                        clamp(edge / fair_feather - 1.0, 0.0, 1.0), line ? -1.0 : min(lod, largest_lod));
+                        clamp(edge * edge / fair_feather - 1.0, 0.0, 1.0), line ? -1.0 : min(lod, largest_lod));
+  light_of_view = vec4(relight, 1.0);
 }
 )";
 
@@ -103,12 +136,14 @@ void check_limits(GlFunctions const& gl, View const& view, ViewMesh const& view_
 
 }  // namespace
 
-GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid)
+GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid,
+                 std::optional<CameraLight> const& light)
     : camera_(view_mesh.camera),
       object_from_camera_(*view.object_from_camera),
       area_(pyramid.area),
       levels_(static_cast<int>(pyramid.levels.size())),
       gain_(view.gain.cast<float>()),
+      light_(light),
       index_count_(static_cast<GLsizei>(3 * view_mesh.mesh.triangles.size())) {
   check_limits(gl, view, view_mesh, pyramid);
   for (auto const& vertex : view_mesh.mesh.vertices) bounds_.extend(vertex.cast<double>());
@@ -120,6 +155,17 @@ GpuView::GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_m
                 view_mesh.mesh.vertices.data());
   gl.EnableVertexAttribArray(0);
   gl.VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(Eigen::Vector3f), nullptr);
+  if (light_) {
+    VertexLight const of_vertices = vertex_light(view_mesh.mesh, *light_);
+    auto const attribute = [&](GLuint location, GlBuffer& buffer, std::vector<Eigen::Vector3f> const& values) {
+      buffer = GlBuffer(gl);
+      upload_buffer(gl, GL_ARRAY_BUFFER, buffer, values.size() * sizeof(Eigen::Vector3f), values.data());
+      gl.EnableVertexAttribArray(location);
+      gl.VertexAttribPointer(location, 3, GL_FLOAT, GL_FALSE, sizeof(Eigen::Vector3f), nullptr);
+    };
+    attribute(1, normals_, of_vertices.normals);
+    attribute(2, logarithms_, of_vertices.logarithms);
+  }
   indices_ = GlBuffer(gl);
   upload_buffer(gl, GL_ELEMENT_ARRAY_BUFFER, indices_, view_mesh.mesh.triangles.size() * sizeof(Eigen::Vector3i),
                 view_mesh.mesh.triangles.data());
@@ -193,6 +239,22 @@ bool ViewPass::draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d
   program_.use();
   gl_.UniformMatrix4fv(program_.uniform("clip_from_source"), 1, GL_FALSE, clip_from_source.data());
   gl_.UniformMatrix4fv(program_.uniform("sample_from_source"), 1, GL_FALSE, samples.data());
+  Eigen::Matrix4f const camera_from = camera_from_source.matrix().cast<float>();
+  gl_.UniformMatrix4fv(program_.uniform("camera_from_source"), 1, GL_FALSE, camera_from.data());
+  bool const far = !view.camera_.is_perspective();
+  Eigen::Vector3f const source =
+      (far ? Vector3d(-camera_from_source.linear().col(2)) : Vector3d(camera_from_source.translation())).cast<float>();
+  gl_.Uniform3f(program_.uniform("source"), source.x(), source.y(), source.z());
+  gl_.Uniform1i(program_.uniform("source_far"), far ? 1 : 0);
+  gl_.Uniform1i(program_.uniform("perspective"), camera.is_perspective() ? 1 : 0);
+  double const width = SoftZ::kNearSpacings * look.spacing;
+  gl_.Uniform1f(program_.uniform("angle_scale"), static_cast<float>(1 / (width * width)));
+  bool const lit = look.relight && view.light_;
+  gl_.Uniform1i(program_.uniform("lit"), lit ? 1 : 0);
+  if (lit) {
+    Eigen::Matrix<float, 3, CameraLight::kTerms> const light = view.light_->coefficients.transpose().cast<float>();
+    gl_.Uniform3fv(program_.uniform("light"), CameraLight::kTerms, light.data());
+  }
   gl_.Uniform1f(program_.uniform("least_weight"), static_cast<float>(SoftZ::kLeastQuality));
   gl_.Uniform1f(program_.uniform("fair_feather"), static_cast<float>(SoftZ::kFairFeather));
   gl_.Uniform2f(program_.uniform("size"), static_cast<float>(view.area_.width), static_cast<float>(view.area_.height));

@@ -13,7 +13,8 @@ namespace scanview {
 class GpuView {
  public:
   /// Throws Error{bad_input} where sizes do not fit each other or exceed what OpenGL can do here.
-  GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid);
+  GpuView(GlFunctions const& gl, View const& view, ViewMesh const& view_mesh, PicturePyramid const& pyramid,
+          std::optional<CameraLight> const& light);
   /// Where the compositor finds the picture.
   void place(Camera const& camera, Eigen::Isometry3d const& object_from_camera, LayerPicture& picture) const;
 
@@ -24,10 +25,11 @@ class GpuView {
   cv::Rect area_;
   int levels_ = 0;
   Eigen::Vector3f gain_;
+  std::optional<CameraLight> light_;
   Eigen::AlignedBox3d bounds_;  ///< of the vertices, in the view's camera coordinates
   GLsizei index_count_ = 0;
   GlVertexArray vertex_array_;
-  GlBuffer vertices_, indices_, cos_phi_;
+  GlBuffer vertices_, normals_, logarithms_, indices_, cos_phi_;
   GlTexture picture_, feather_, cos_phi_texture_;
 };
 
@@ -41,6 +43,8 @@ class ViewPass {
   struct Look {
     bool cosine = true, feather = true;  ///< whether they count in the weight
     bool wireframe = false;              ///< edges over the picture, in its false colour
+    bool relight = true;                 ///< as far as there is a CameraLight
+    double spacing = 1;                  ///< of neighbouring views, radians
   };
   bool draw(GpuView const& view, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
             Look const& look) const;

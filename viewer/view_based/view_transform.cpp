@@ -55,7 +55,7 @@ ScreenTransform screen_transform(Camera const& camera, Eigen::Isometry3d const& 
   ScreenTransform transform;
   for (int c = 0; c < 4; ++c) {
     for (int r = 0; r < 3; ++r) transform.rows[r][c] = rows(r, c);  // u, v, w
-    transform.rows[ScreenTransform::depth][c] = camera_from_source.matrix()(2, c);
+    for (int r = 0; r < 3; ++r) transform.rows[ScreenTransform::x_camera + r][c] = camera_from_source.matrix()(r, c);
   }
   transform.perspective = camera.is_perspective();
   transform.near = range.near;
