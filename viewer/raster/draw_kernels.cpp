@@ -181,9 +181,9 @@ class TextureWriter {
                              HWY_ATTR { return hn::Sub(hn::Set(d, of_value), hn::Mul(value, hn::Set(d, of_w))); };
       auto const sx = slope(slopes.x[1], slopes.x[3], s), tx = slope(slopes.x[2], slopes.x[3], t);
       auto const sy = slope(slopes.y[1], slopes.y[3], s), ty = slope(slopes.y[2], slopes.y[3], t);
-      auto const along_x = hn::Add(hn::Mul(sx, sx), hn::Mul(tx, tx));
-      auto const along_y = hn::Add(hn::Mul(sy, sy), hn::Mul(ty, ty));
-      auto const rho = hn::Mul(hn::Max(along_x, along_y), hn::Mul(inverse, inverse));
+      // The area of the pixel in texels: the longer side would blur whatever is seen at an angle, and views are
+      // averaged anyway.
+      auto const rho = hn::Mul(hn::Abs(hn::Sub(hn::Mul(sx, ty), hn::Mul(sy, tx))), hn::Mul(inverse, inverse));
       auto const minified = hn::Gt(rho, hn::Set(d, 1.0F));
       if (!hn::AllFalse(d, minified)) {
         auto lod = hn::Mul(hn::Set(d, 0.5F), Log2(hn::Min(hn::Max(rho, hn::Set(d, 1.0F)), hn::Set(d, 1e30F))));

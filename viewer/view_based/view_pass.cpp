@@ -82,7 +82,7 @@ void main() {
   vec2 st = texture_and_depth.xy / texture_and_depth.z;
   // Spelled out, because OpenGL leaves the choice of the mipmap to the driver.
   vec2 along_x = dFdx(st) * size, along_y = dFdy(st) * size;
-  float lod = 0.5 * log2(max(max(dot(along_x, along_x), dot(along_y, along_y)), 1.0));
+  float lod = 0.5 * log2(max(abs(along_x.x * along_y.y - along_y.x * along_x.y), 1.0));
   float edge = feather_at(st);
   // In 16 bits, as the rasteriser keeps it.
   float near_cosine = floor(nearness * texelFetch(cos_phi, gl_PrimitiveID).r * 65535.0 + 0.5) / 65535.0;
