@@ -21,7 +21,7 @@ struct RenderArguments {
   fs::path set, output, path;
   int orbit = 0;
   bool halfway = false;
-  std::string like, size = "800x600", back_end = "gl";
+  std::string like, size = "800x600", back_end = "cpu";
   int supersampling = 2;
   ViewBasedOptions options;
 };
@@ -35,21 +35,22 @@ std::pair<int, int> parse_size(std::string const& text) {
   return {width, height};
 }
 
-std::vector<PathCamera> cameras(RenderArguments const& arguments, ScanSet const& set) {
+std::vector<PathCamera> cameras(RenderArguments const& arguments, ViewLibrary const& library) {
+  ScanSet const& set = library.set();
   auto const [width, height] = parse_size(arguments.size);
-  if (arguments.orbit > 0) return orbit_path(set, arguments.orbit, width, height);
-  if (arguments.halfway) return halfway_path(set, width, height);
+  if (arguments.orbit > 0) return orbit_path(set, orbit_frame(set, library.radius()), arguments.orbit, width, height);
+  if (arguments.halfway) return halfway_path(set, orbit_frame(set, library.radius()), width, height);
   if (!arguments.path.empty()) return read_camera_path(arguments.path, set, width, height);
   return {camera_like(set, arguments.like, width, height)};
 }
 
 void render(RenderArguments const& arguments, Session& session) {
   Context& context = session.context;
-  ScanSet const set = read_scan_set(arguments.set, context);
-  auto const path = cameras(arguments, set);
-  auto const gl = make_offscreen_context();
-  auto const renderer = make_gl_renderer(
-      *gl, std::make_shared<ViewLibrary>(set, read_view_meshes(arguments.set, set, context)), arguments.options);
+  auto const library = ViewLibrary::open(arguments.set, context);
+  auto const path = cameras(arguments, *library);
+  auto const gl = arguments.back_end == "gl" ? make_offscreen_context() : nullptr;
+  auto const renderer = gl ? make_gl_renderer(*gl, library, arguments.options)
+                           : make_cpu_renderer(library, arguments.options, context.threads);
   SupersamplingRenderer smooth(*renderer, arguments.supersampling);
   std::error_code error;
   fs::create_directories(arguments.output, error);
@@ -66,10 +67,13 @@ void render(RenderArguments const& arguments, Session& session) {
     std::string const file = path[i].name + ".png";
     write_file(arguments.output / file, encode_png(frame.color));
     write_depth_exr(arguments.output / (path[i].name + ".exr"), frame.depth);
-    session.report["frames"].push_back({{"file", file}, {"milliseconds", times.back()}});
+    session.report["frames"].push_back(
+        {{"file", file}, {"milliseconds", times.back()}, {"stages", renderer->stages()}});
     context.progress("render", i + 1, path.size());
   }
   std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
+  for (auto const& failure : library->failures()) context.warn(failure);
+  if (!library->failures().empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
   session.report["fps_median"] = times.empty() ? 0 : 1e3 / times[times.size() / 2];
 }
 
@@ -88,8 +92,8 @@ void add_render(CLI::App& app, Session& session) {
   which->add_option("--like", arguments->like, "From the camera of this view");
   which->require_option(1);
   verb->add_option("--size", arguments->size, "WIDTHxHEIGHT");
-  verb->add_option("--back-end", arguments->back_end, "gl (OpenGL 3.3 without a display)")
-      ->check(CLI::IsMember({"gl"}));
+  verb->add_option("--back-end", arguments->back_end, "cpu, or gl (OpenGL 3.3 without a display)")
+      ->check(CLI::IsMember({"cpu", "gl"}));
   verb->add_option("--supersampling", arguments->supersampling, "Samples a pixel of a border, each way")
       ->check(CLI::Range(1, 8));
   verb->add_option("--threshold", arguments->options.threshold, "Of soft z, in units (default: from the error budget)");

@@ -148,7 +148,7 @@ Scene scan(Surface const& surface, Camera const& camera, std::vector<Eigen::Isom
     scene.meshes.push_back(grid_mesh(scene.set.views.back(), step));
   }
   scene.set.unit = Unit::arbitrary;
-  scene.set.error_budget.sampling.p95 = threshold;
+  scene.set.error_budget.sampling.p95 = threshold / 2;  // default_threshold()
   return scene;
 }
 

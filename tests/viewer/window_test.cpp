@@ -554,7 +554,7 @@ TEST_F(WindowFolder, AViewedSetFollowsItsFiles) {
   rewrite(0.125001);
   ASSERT_EQ(settle(viewed), ViewedSet::Reload::done);
   EXPECT_EQ(viewed.look(), look);
-  EXPECT_NEAR(viewed.default_look().threshold, before + 0.25, 0.1);
+  EXPECT_NEAR(viewed.default_look().threshold, before + 0.5, 0.1);
 
   // What cannot be read leaves everything as it was.
   auto const good = viewed.library();

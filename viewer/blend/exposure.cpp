@@ -150,7 +150,8 @@ std::vector<Pair> shared_surfaces(ScanSet const& set, double threshold, Context&
   double pixels = 0;
   for (auto const& view : set.views) pixels += static_cast<double>(view.image.count_depths());
   // As if every view saw all that the others see.
-  int const stride = std::max(4, static_cast<int>(std::ceil(std::sqrt(pixels * static_cast<double>(n - 1) / kMostSamples))));
+  int const stride =
+      std::max(4, static_cast<int>(std::ceil(std::sqrt(pixels * static_cast<double>(n - 1) / kMostSamples))));
   std::vector<Pair> pairs(n * n);
   for_each_index(
       context, n,

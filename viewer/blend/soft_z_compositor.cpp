@@ -38,6 +38,7 @@ uniform bool nearest;
 uniform float threshold;
 uniform float ramp;                // 1 / (half a threshold)
 uniform float reliability_ratio;
+uniform float always;
 layout(location = 0) out vec4 sum;
 layout(location = 1) out float sum_depth;
 
@@ -89,7 +90,7 @@ void main() {
       seen[k] = reliable[k] * (1.0 - hidden);
       good += layer_weight[layer[k]] * min(1.0, GOOD_AT_ZERO + quality[k] / GOOD_QUALITY) * seen[k];
     }
-    float need = clamp(1.0 - good / GOOD_ENOUGH, 0.0, 1.0);
+    float need = clamp(1.0 - good / GOOD_ENOUGH, always, 1.0);
     for (int k = 0; k < count; ++k) {
       share[k] = (layer_weight[layer[k]] + need * fair_fill[k]) * quality[k] * seen[k];
     }
@@ -211,6 +212,12 @@ void SoftZCompositor::set_weights(std::vector<LayerWeight> const& weights, SoftZ
     gl_.Uniform1fv(add_.uniform("layer_fill_rank"), count, rank.data());
     gl_.Uniform3fv(add_.uniform("layer_hue"), count, hue.front().data());
   }
+  // fill_rank(): the same for all layers.
+  double always = 0;
+  for (auto const& layer : weights) {
+    if (layer.fill > 0) always = SoftZ::kAlways * layer.fill_rank / layer.fill;
+  }
+  gl_.Uniform1f(add_.uniform("always"), static_cast<float>(always));
   gl_.Uniform1i(add_.uniform("show"), static_cast<GLint>(soft_z.show));
   gl_.Uniform1i(add_.uniform("nearest"), soft_z.nearest ? 1 : 0);
   // Infinite and zero thresholds stay finite in the shader's arithmetic and mean the same.

@@ -42,7 +42,8 @@ class LumigraphRenderer final : public HeldOutRenderer {
     for (std::size_t const view : used_) {
       RasterView const* const raster = views_.get(view, true);
       LayerRasterizer::Layer layer;
-      if (raster == nullptr || !raster->transform_to(camera, object_from_camera, kAllAlike, false, layer.transform)) continue;
+      if (raster == nullptr || !raster->transform_to(camera, object_from_camera, kAllAlike, false, layer.transform))
+        continue;
       layer.mesh = &raster->mesh();
       layer.largest_lod = static_cast<float>(raster->texture().levels.size() - 1);
       layers.push_back(layer);

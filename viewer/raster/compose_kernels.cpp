@@ -82,7 +82,8 @@ void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea
       auto const feather = hn::Mul(mix(upper, lower, taps.down), hn::Set(d, 1.0F / 255));
       if (layer.feather) quality = hn::Mul(quality, feather);
       hn::StoreU(hn::IfThenElseZero(drawn, Clamp(quality, how.least_weight, 1.0F)), d, layer.quality + at);
-      auto const fairness = hn::Sub(hn::Mul(hn::Mul(feather, feather), hn::Set(d, 1.0F / how.fair_feather)), hn::Set(d, 1.0F));
+      auto const fairness =
+          hn::Sub(hn::Mul(hn::Mul(feather, feather), hn::Set(d, 1.0F / how.fair_feather)), hn::Set(d, 1.0F));
       hn::StoreU(hn::IfThenElseZero(drawn, Clamp(fairness, 0.0F, 1.0F)), d, layer.fairness + at);
     }
   }
@@ -278,7 +279,7 @@ HWY_INLINE void SoftZShares(ComposedLayer const* layers, Composition const& how,
     auto const part = hn::Mul(hn::Mul(hn::Set(d, weight), goodness), hn::Load(d, group.seen[k]));
     good = hn::Add(good, hn::IfThenElseZero(there, part));
   }
-  auto const need = Clamp(hn::Sub(one, hn::Mul(good, hn::Set(d, 1.0F / how.good_enough))), 0.0F, 1.0F);
+  auto const need = Clamp(hn::Sub(one, hn::Mul(good, hn::Set(d, 1.0F / how.good_enough))), how.always, 1.0F);
   for (std::size_t k = 0; k < group.count; ++k) {
     auto const weight =
         hn::Add(hn::Set(d, layers[group.layer[k]].weight), hn::Mul(need, hn::Load(d, group.fair_fill[k])));

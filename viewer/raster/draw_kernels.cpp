@@ -34,14 +34,14 @@ template <class V>
 HWY_INLINE V Nearness(ScreenTransform const& transform, V x, V y, V z) {
   Floats const d;
   auto const one = hn::Set(d, 1.0F);
-  auto const length = [&](V a, V b, V c) HWY_ATTR {
-    return hn::Sqrt(hn::Add(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Mul(c, c)));
-  };
+  auto const length = [&](V a, V b, V c)
+                          HWY_ATTR { return hn::Sqrt(hn::Add(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Mul(c, c))); };
   auto const sx = hn::Set(d, transform.source[0]), sy = hn::Set(d, transform.source[1]),
              sz = hn::Set(d, transform.source[2]);
   auto const vx = transform.source_far ? sx : hn::Sub(sx, x), vy = transform.source_far ? sy : hn::Sub(sy, y),
              vz = transform.source_far ? sz : hn::Sub(sz, z);
-  auto const ex = transform.perspective ? hn::Neg(x) : hn::Zero(d), ey = transform.perspective ? hn::Neg(y) : hn::Zero(d),
+  auto const ex = transform.perspective ? hn::Neg(x) : hn::Zero(d),
+             ey = transform.perspective ? hn::Neg(y) : hn::Zero(d),
              ez = transform.perspective ? hn::Neg(z) : hn::Set(d, -1.0F);
   auto const to_view = length(vx, vy, vz), to_eye = length(ex, ey, ez);
   auto const product = hn::Max(hn::Mul(to_view, to_eye), hn::Set(d, 1e-30F));

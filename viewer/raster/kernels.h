@@ -36,6 +36,7 @@ struct Composition {
   float threshold = 0, ramp = 0;  ///< ramp: 1 / (half a threshold)
   float reliability_ratio = 0.1F;
   float good_enough = 0, good_at_zero = 0, good_quality = 0, fair_feather = 0, least_weight = 0;
+  float always = 0;  ///< views that fill count at least so much
   bool nearest = false;
   bool agree = false;  ///< samples are taken where the mean depth lies, instead of on each layer's own surface
   int show = 0;

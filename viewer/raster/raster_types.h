@@ -20,8 +20,8 @@ struct ScreenVertex {
 inline constexpr std::int32_t kBeyond = INT32_MIN;
 
 /// Rows of the map from source coordinates (x, y, z, 1): position on the screen u w, v w, w (pixels, centre of pixel
-/// (0, 0) at 0), homogeneous texture coordinates s w', t w', w' (texels), and the point in the camera's coordinates, of which depth is
-/// z.
+/// (0, 0) at 0), homogeneous texture coordinates s w', t w', w' (texels), and the point in the camera's coordinates, of
+/// which depth is z.
 struct ScreenTransform {
   enum Row { u, v, w, s, t, texture_w, x_camera, y_camera, depth, kRows };
   double rows[kRows][4] = {};
@@ -31,7 +31,7 @@ struct ScreenTransform {
   float source[3] = {};
   bool source_far = false;
   float angle_scale = 0;  ///< nearness = 1 / (1 + angle_scale θ²)
-  bool lit = false;         ///< whether there is a light (CameraLight), and the mesh has normals
+  bool lit = false;       ///< whether there is a light (CameraLight), and the mesh has normals
   float camera_from_source[3][3] = {};
   float light[8][3] = {};  ///< CameraLight::coefficients
 };

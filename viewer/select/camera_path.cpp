@@ -140,9 +140,8 @@ PathCamera framing_camera(ScanSet const& set, OrbitFrame const& frame, Vector3d 
           {}};
 }
 
-std::vector<PathCamera> orbit_path(ScanSet const& set, int count, int width, int height) {
+std::vector<PathCamera> orbit_path(ScanSet const& set, OrbitFrame const& frame, int count, int width, int height) {
   if (count < 1) throw Error(ErrorCode::usage, {}, "an orbit needs at least one frame");
-  OrbitFrame const frame = orbit_frame(set);
   std::vector<PathCamera> path;
   for (int i = 0; i < count; ++i) {
     Eigen::AngleAxisd const turn(2 * std::numbers::pi * i / count, frame.up);
@@ -162,9 +161,8 @@ PathCamera camera_like(ScanSet const& set, std::string const& view_name, int wid
   throw Error(ErrorCode::usage, {}, "the set has no view named '" + view_name + "'");
 }
 
-std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int height) {
+std::vector<PathCamera> halfway_path(ScanSet const& set, OrbitFrame const& frame, int width, int height) {
   check_size(width, height);
-  OrbitFrame const frame = orbit_frame(set);
   auto const directions = view_directions(set);
   std::size_t const count = directions.size();
   std::vector<std::pair<std::size_t, std::size_t>> gaps;
@@ -193,6 +191,7 @@ std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int height) 
 }
 
 std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, ScanSet const& set, int width, int height) {
+  OrbitFrame const frame = orbit_frame(set);
   check_size(width, height);
   Json const json = read_json(file);
   auto const refuse = [&](std::string const& why) { throw Error(ErrorCode::bad_input, file, why); };
@@ -211,7 +210,6 @@ std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, Scan
   if (!json.contains("keyframes") || !json["keyframes"].is_array() || json["keyframes"].empty()) {
     refuse("keyframes is no list of cameras");
   }
-  OrbitFrame const frame = orbit_frame(set);
   std::vector<PathCamera> keys;
   for (auto const& entry : json["keyframes"]) {
     std::string const what = fmt::format("keyframe {}", keys.size());

@@ -38,7 +38,10 @@ PathCamera framing_camera(ScanSet const& set, OrbitFrame const& frame, Eigen::Ve
                           int height);
 
 /// A full turn about `up` in `count` steps, starting at the first view.
-std::vector<PathCamera> orbit_path(ScanSet const& set, int count, int width, int height);
+std::vector<PathCamera> orbit_path(ScanSet const& set, OrbitFrame const& frame, int count, int width, int height);
+inline std::vector<PathCamera> orbit_path(ScanSet const& set, int count, int width, int height) {
+  return orbit_path(set, orbit_frame(set), count, width, height);
+}
 
 /// The same view in a picture of another size: whole and undistorted, with margins where the aspects differ.
 Camera fit_camera(Camera const& camera, int width, int height);
@@ -48,7 +51,10 @@ PathCamera camera_like(ScanSet const& set, std::string const& view_name, int wid
 
 /// Halfway between consecutive views (and between last and first, where that gap is no wider than one and a half times
 /// the median gap): eye on the great arc about the centre, orientation by slerp. Orthographic views: framing cameras.
-std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int height);
+std::vector<PathCamera> halfway_path(ScanSet const& set, OrbitFrame const& frame, int width, int height);
+inline std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int height) {
+  return halfway_path(set, orbit_frame(set), width, height);
+}
 
 /// A camera path file: {"format": 1, "keyframes": [{"camera": {...} (optional), "object_from_camera": [16]}, ...],
 /// "between": frames from one keyframe to the next, not counting its end (default 1: keyframes only)}. Throws

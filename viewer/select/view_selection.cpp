@@ -48,6 +48,7 @@ std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main, std::v
 }
 
 double median_spacing(std::vector<Vector3d> const& directions) {
+  constexpr double kLeastSpacing = 0.05;
   std::vector<double> nearest;
   for (std::size_t i = 0; i < directions.size(); ++i) {
     double least = std::numbers::pi;
@@ -55,7 +56,7 @@ double median_spacing(std::vector<Vector3d> const& directions) {
       if (j == i) continue;
       least = std::min(least, std::atan2(directions[i].cross(directions[j]).norm(), directions[i].dot(directions[j])));
     }
-    nearest.push_back(std::max(least, 1e-3));
+    nearest.push_back(std::max(least, kLeastSpacing));
   }
   return median(std::move(nearest));
 }

@@ -27,8 +27,8 @@ std::vector<UsedView> add_fill_views(std::vector<ViewWeight> const& main,
                                      std::vector<Eigen::Vector3d> const& directions, Eigen::Vector3d const& eye,
                                      int fill_views);
 
-/// Median angle between a direction and its nearest neighbour, radians; π where there is one direction only. Coinciding
-/// ones count as a milliradian apart.
+/// Median angle between a direction and its nearest neighbour, radians; π where there is one direction only. Closer
+/// ones, coinciding ones say, count as 0.05 apart.
 double median_spacing(std::vector<Eigen::Vector3d> const& directions);
 
 /// How much `fill` counts where it is decided what hides what: fully where the eye is between views, hardly where it is

@@ -88,7 +88,8 @@ class CpuRenderer final : public ViewBasedRenderer {
       compose.feather = options().feather;
       composed.push_back(compose);
     }
-    Composition const how = composition(soft_z(), camera);
+    Composition how = composition(soft_z(), camera);
+    how.always = static_cast<float>(SoftZ::kAlways * rank);
     rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
       auto of_tile = composed;
       for (std::size_t i = 0; i < of_tile.size(); ++i) {

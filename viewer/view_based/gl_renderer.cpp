@@ -47,7 +47,7 @@ class GlRenderer final : public ViewBasedRenderer {
     ViewMesh const& mesh = library().meshes()[view];
     context_.make_current();
     gpu_->views[view].emplace(gl_, library().set().views[view], mesh, picture_pyramid(picture, mesh),
-                               library().set().light);
+                              library().set().light);
     return true;
   }
 
@@ -66,7 +66,8 @@ class GlRenderer final : public ViewBasedRenderer {
     for (auto const& view : drawn) {
       GpuView const& gpu = *gpu_->views[view.view];
       gpu_->targets.begin_layer(static_cast<int>(weights.size()));
-      gpu_->pass.draw(gpu, camera, object_from_camera, {options().cosine, options().feather, options().wireframe, options().relight, spacing()});
+      gpu_->pass.draw(gpu, camera, object_from_camera,
+                      {options().cosine, options().feather, options().wireframe, options().relight, spacing()});
       weights.push_back({view.weight, view.fill, rank * view.fill, view_hue(view.view)});
       gpu.place(camera, object_from_camera, pictures.emplace_back());
     }

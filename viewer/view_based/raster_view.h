@@ -23,8 +23,8 @@ class RasterView {
   Eigen::Vector3f const& gain() const { return gain_; }
   /// False where all of the view lies behind the camera. `spacing`: typical angle between neighbouring views, radians
   /// (infinite: all directions are alike); `relight`: as far as there is a CameraLight.
-  bool transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera,
-                    double spacing, bool relight, ScreenTransform& transform) const;
+  bool transform_to(Camera const& camera, Eigen::Isometry3d const& object_from_camera, double spacing, bool relight,
+                    ScreenTransform& transform) const;
   PicturePlace place(Camera const& camera, Eigen::Isometry3d const& object_from_camera) const {
     return picture_place(camera_, area_, object_from_camera_.inverse() * object_from_camera, camera);
   }

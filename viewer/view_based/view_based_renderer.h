@@ -19,7 +19,7 @@ struct ViewBasedOptions {
   double threshold = -1;
   /// A sample whose weight is below this share of one further away does not hide it (Pulli 1997: "a low confidence
   /// pixel in front of a high confidence one is ignored").
-  double reliability_ratio = 0.1;
+  double reliability_ratio = 0.05;
   /// Views beyond the three that fill what these do not see (soft_z.h); 0: the paper's three only. At most 16.
   int fill_views = 12;
   /// Views that are not used (held out).
@@ -31,7 +31,7 @@ struct ViewBasedOptions {
   enum class Visibility { soft_z, nearest } visibility = Visibility::soft_z;
   /// picture; or in false colour how much each view counts in a pixel; or which view counts most. Colours: view_hue().
   SoftZ::Show show = SoftZ::Show::picture;
-  bool relight = true;     ///< where the set has a CameraLight: as if it stood with this camera as it did with the views'
+  bool relight = true;  ///< where the set has a CameraLight: as if it stood with this camera as it did with the views'
   bool wireframe = false;  ///< the triangles' edges over the picture, in their views' colours
   void validate() const;
 };
