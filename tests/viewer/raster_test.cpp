@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <cmath>
 #include <cstring>
@@ -367,6 +368,7 @@ TEST(IdBuffer, SharedEdgesOwnEveryPixelOnce) {
 }
 
 TEST(IdBuffer, OfEqualDepthsTheFirstWins) {
+  tbb::global_control const allow(tbb::global_control::max_allowed_parallelism, 8);
   // Stacks of the same triangle, also across the parts of 8192 that threads share out, and one that must be clipped.
   TriangleMesh mesh;
   mesh.vertices = {{-1, -1, 2}, {3, -1, 2}, {-1, 3, 2}, {-4e3F, -4e3F, 2}, {8e3F, -4e3F, 2}, {-4e3F, 8e3F, 2}};
@@ -584,6 +586,7 @@ TEST(Kernels, AllInstructionSetsGiveTheSameBytes) {
 }
 
 TEST(Kernels, AnyNumberOfThreadsGivesTheSameBytes) {
+  tbb::global_control const allow(tbb::global_control::max_allowed_parallelism, 8);
   auto const mesh = sphere_mesh(200, 150);
   Camera const camera = Camera::perspective(333, 217, 300, 300, 160, 110);
   auto const ids = draw_id_buffer(mesh, camera, kBefore, Culling::none, 1);
