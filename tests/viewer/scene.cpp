@@ -163,6 +163,12 @@ std::string back_end_name(testing::TestParamInfo<BackEnd> const& info) {
   return info.param == BackEnd::cpu ? "Cpu" : "OpenGl";
 }
 
+int greatest_difference(cv::Vec4b const& a, cv::Vec4b const& b) {
+  int greatest = 0;
+  for (int c = 0; c < 4; ++c) greatest = std::max(greatest, std::abs(a[c] - b[c]));
+  return greatest;
+}
+
 cv::Mat3b bgr(cv::Mat4b const& picture) {
   cv::Mat3b result;
   cv::cvtColor(picture, result, cv::COLOR_BGRA2BGR);

@@ -51,6 +51,8 @@ std::unique_ptr<ViewBasedRenderer> make_renderer(BackEnd back_end, std::shared_p
                                                  ViewBasedOptions const& options = {});
 std::string back_end_name(testing::TestParamInfo<BackEnd> const& info);
 
+/// Of the channels (subtraction of cv::Vec4b would end at zero).
+int greatest_difference(cv::Vec4b const& a, cv::Vec4b const& b);
 cv::Mat3b bgr(cv::Mat4b const& picture);
 std::size_t drawn_pixels(cv::Mat4b const& picture);
 

@@ -420,7 +420,7 @@ TEST_P(Rendering, MovingTheEyeALittleChangesThePictureALittle) {
       int worse = 0;
       for (int y = 0; y < a.color.rows; ++y) {
         for (int x = 0; x < a.color.cols; ++x) {
-          if (a.color(y, x)[3] == b.color(y, x)[3] && cv::norm(a.color(y, x) - b.color(y, x), cv::NORM_INF) > 3)
+          if (a.color(y, x)[3] == b.color(y, x)[3] && greatest_difference(a.color(y, x), b.color(y, x)) > 3)
             ++worse;
         }
       }

@@ -203,7 +203,7 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
   if (writer.wants_edges()) {
     for (int k = 0; k < 3; ++k) {
       float const ex = static_cast<float>(step_x[k]), ey = static_cast<float>(step_y[k]);
-      edge_scale[k] = 256.0F / std::max(1.0F, std::sqrt(ex * ex + ey * ey));
+      edge_scale[k] = 1 / std::max(1.0F, std::sqrt(ex * ex + ey * ey));
     }
   }
 
