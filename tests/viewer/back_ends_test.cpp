@@ -200,7 +200,9 @@ TEST(BackEnds, WireframesHaveLinesInTheViewsColours) {
     EXPECT_GT(share[back_end], 0.02);
     EXPECT_LT(share[back_end], 0.5);
   }
-  EXPECT_NEAR(share[BackEnd::cpu], share[BackEnd::gl], 0.03);
+  // OpenGL draws lines of a pixel, of which the surface they lie in hides parts; the rasteriser marks what is within
+  // 0.6 pixels of an edge.
+  EXPECT_NEAR(share[BackEnd::cpu], share[BackEnd::gl], 0.08);
 }
 
 TEST(BackEnds, OptionsMayChangeBetweenFrames) {

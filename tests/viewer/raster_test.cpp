@@ -562,6 +562,33 @@ void expect_same(std::vector<Frame> const& a, std::vector<Frame> const& b) {
   }
 }
 
+TEST(CpuFrames, LargePicturesHaveNoSeams) {
+  // Two blocks beside each other, and one above the other, against what is drawn in one.
+  auto const scene = textured();
+  auto const renderer = make_cpu_renderer(std::make_shared<ViewLibrary>(scene.set, scene.meshes));
+  Isometry3d const pose = look_at({0.4, 0.3, 3}, {0, 0, 0});
+  struct Case {
+    Camera camera;
+    cv::Rect around;
+  };
+  for (Case const& one : {Case{Camera::perspective(4200, 90, 150, 150, 4100, 45), cv::Rect(4046, 0, 120, 90)},
+                          Case{Camera::perspective(90, 4200, 150, 150, 45, 4090), cv::Rect(0, 4046, 90, 120)}}) {
+    auto const whole = renderer->render(one.camera, pose);
+    cv::Rect const& r = one.around;
+    auto const part = renderer->render(one.camera.cropped(r.x, r.y, r.width, r.height), pose);
+    int drawn = 0, different = 0;
+    for (int y = 0; y < r.height; ++y) {
+      for (int x = 0; x < r.width; ++x) {
+        auto const& pixel = part.color(y, x);
+        drawn += pixel[3] != 0;
+        different += greatest_difference(whole.color(r.y + y, r.x + x), pixel) > 4;
+      }
+    }
+    EXPECT_GT(drawn, 5000);
+    EXPECT_LT(different, 10);  // of the outline, rounded to 1/256 pixel from other single precision numbers
+  }
+}
+
 struct AllTargets {
   ~AllTargets() { use_kernel_target(""); }
 };
