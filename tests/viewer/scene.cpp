@@ -152,6 +152,23 @@ Scene scan(Surface const& surface, Camera const& camera, std::vector<Eigen::Isom
   return scene;
 }
 
+std::unique_ptr<ViewBasedRenderer> make_renderer(BackEnd back_end, std::shared_ptr<ViewLibrary> library,
+                                                 ViewBasedOptions const& options) {
+  if (back_end == BackEnd::cpu) return make_cpu_renderer(std::move(library), options);
+  static auto const context = make_offscreen_context();
+  return make_gl_renderer(*context, std::move(library), options);
+}
+
+std::string back_end_name(testing::TestParamInfo<BackEnd> const& info) {
+  return info.param == BackEnd::cpu ? "Cpu" : "OpenGl";
+}
+
+int greatest_difference(cv::Vec4b const& a, cv::Vec4b const& b) {
+  int greatest = 0;
+  for (int c = 0; c < 4; ++c) greatest = std::max(greatest, std::abs(a[c] - b[c]));
+  return greatest;
+}
+
 cv::Mat3b bgr(cv::Mat4b const& picture) {
   cv::Mat3b result;
   cv::cvtColor(picture, result, cv::COLOR_BGRA2BGR);

@@ -1,10 +1,13 @@
 #pragma once
+#include <gtest/gtest.h>
+
 #include <functional>
 #include <optional>
 #include <vector>
 
 #include "acquire/scan_set.h"
 #include "mesh/view_mesh.h"
+#include "viewer/view_based/view_based_renderer.h"
 
 namespace scanview::test {
 
@@ -43,6 +46,13 @@ struct Scene {
 Scene scan(Surface const& surface, Camera const& camera, std::vector<Eigen::Isometry3d> const& poses, double step,
            double threshold);
 
+/// A renderer of either kind; all of OpenGL share one context off screen.
+std::unique_ptr<ViewBasedRenderer> make_renderer(BackEnd back_end, std::shared_ptr<ViewLibrary> library,
+                                                 ViewBasedOptions const& options = {});
+std::string back_end_name(testing::TestParamInfo<BackEnd> const& info);
+
+/// Of the channels (subtraction of cv::Vec4b would end at zero).
+int greatest_difference(cv::Vec4b const& a, cv::Vec4b const& b);
 cv::Mat3b bgr(cv::Mat4b const& picture);
 std::size_t drawn_pixels(cv::Mat4b const& picture);
 

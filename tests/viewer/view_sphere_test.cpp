@@ -153,6 +153,48 @@ TEST(ViewSphere, WeightsAreContinuousAlongArcs) {
   }
 }
 
+TEST(ViewSphere, AlongARandomWalkWeightsAreLipschitz) {
+  // 10 000 steps of 1e-7 to 1e-2 radians, each with its own bound. The constant is that of
+  // WeightsAreContinuousAlongArcs for all sets. For the octahedron it is exact: a face at distance d = 1/sqrt(3) from
+  // the centre with heights h = sqrt(3/2). An eye's ray under the angle ψ to its normal, cos ψ >= d, moves its foot by
+  // at most 1/d a radian, and a weight by 1/h a length: 1 / (d h) = sqrt(2).
+  for (auto const& [name, directions] : sets()) {
+    SCOPED_TRACE(name);
+    double const lipschitz = name == "octahedron" ? std::sqrt(2) : 300;
+    ViewSphere const sphere(directions);
+    CounterRandom random(18, 0);
+    Vector3d eye = random_direction(random);
+    auto at_eye = weights_of(sphere, eye);
+    std::size_t face = 0;
+    for (int i = 0; i < 10000; ++i) {
+      double const step = std::pow(10.0, -7 + 5 * random.uniform());
+      // Now and then onto the plane through two views and the centre, where an edge may be.
+      Vector3d next = (eye + step * random_direction(random)).normalized();
+      if (i % 10 == 0 && directions.size() > 1) {
+        auto const& a = directions[random.below(std::uint32_t(directions.size()))];
+        auto const& b = directions[random.below(std::uint32_t(directions.size()))];
+        eye = (a + random.uniform() * (b - a) + 1e-3 * Vector3d(random.normal(), random.normal(), random.normal()))
+                  .normalized();
+        at_eye = weights_of(sphere, eye);
+        next = eye;
+        if (a.cross(b).norm() > 1e-3) {
+          Vector3d const pole = a.cross(b).normalized();
+          next = (eye - 1.5 * eye.dot(pole) * pole).normalized();  // across it
+        }
+      }
+      double const angle = std::atan2(eye.cross(next).norm(), eye.dot(next));
+      auto const at_next = weights_of(sphere, next);
+      ASSERT_LE(change(at_eye, at_next), lipschitz * angle * (1 + 1e-6) + 1e-12) << i;
+      // And where the search starts does not matter.
+      std::map<std::size_t, double> walked;
+      for (auto const& w : sphere.weights(next, face)) walked[w.view] = w.weight;
+      ASSERT_LE(change(walked, at_next), 1e-12) << i;
+      eye = next;
+      at_eye = at_next;
+    }
+  }
+}
+
 TEST(ViewSphere, WeightsDoNotJumpAnywhereOnAnArc) {
   // Bisection: from the two ends of an arc towards the half that changes more. At a jump the change stays; along a
   // slope of at most 300 a radian it is below 1e-6 after the step has shrunk to 1e-9.

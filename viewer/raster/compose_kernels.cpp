@@ -364,7 +364,9 @@ void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition c
           if (hn::AllFalse(d, counts)) continue;
           ComposedLayer const& layer = layers[group.layer[k]];
           auto s = hn::LoadU(d, layer.samples.s + at), t = hn::LoadU(d, layer.samples.t + at);
-          if (how.agree && group.count > 1) {
+          // By pixel, so that what is drawn does not depend on the vector's width.
+          auto const mixed = hn::Gt(total, share);
+          if (how.agree && !hn::AllFalse(d, mixed)) {
             auto const row = [&](int r) HWY_ATTR {
               auto const linear = [&](float const* m) HWY_ATTR {
                 return hn::Add(hn::Mul(hn::Set(d, m[0]), px), hn::Set(d, m[1] * py + m[2]));
@@ -372,8 +374,8 @@ void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition c
               return hn::Add(hn::Mul(mean_z, linear(layer.along[r])), linear(layer.at[r]));
             };
             auto const inverse_w = hn::Div(hn::Set(d, 1.0F), row(2));
-            s = hn::Mul(row(0), inverse_w);
-            t = hn::Mul(row(1), inverse_w);
+            s = hn::IfThenElse(mixed, hn::Mul(row(0), inverse_w), s);
+            t = hn::IfThenElse(mixed, hn::Mul(row(1), inverse_w), t);
           }
           Color const c = how.show == 0
                               ? SampleLayer(layer, at, counts, s, t)

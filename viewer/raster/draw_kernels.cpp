@@ -285,12 +285,16 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
     at_left[k] = at_a + slopes.x[k] * (static_cast<float>(left) - a_x);
   }
 
+  // Slopes of needles are beyond single precision.
+  auto const [least, most] = std::minmax({a.values[0], b.values[0], c.values[0]});
+  auto const least_key = hn::Set(d, least), most_key = hn::Set(d, most);
+
   // For wireframes: the distance from an edge in pixels is E / length.
   float edge_scale[3] = {0, 0, 0};
   if (writer.wants_edges()) {
     for (int k = 0; k < 3; ++k) {
       float const ex = static_cast<float>(step_x[k]), ey = static_cast<float>(step_y[k]);
-      edge_scale[k] = 256.0F / std::max(1.0F, std::sqrt(ex * ex + ey * ey));
+      edge_scale[k] = 1 / std::max(1.0F, std::sqrt(ex * ex + ey * ey));
     }
   }
 
@@ -309,7 +313,8 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
     for (int x = left; x <= right; x += lanes) {
       auto const covered = hn::Gt(hn::Or(hn::Or(e0, e1), e2), hn::Set(di, -1));
       if (!hn::AllFalse(di, covered)) {
-        auto const key = hn::Add(hn::Set(d, base[0]), hn::Mul(hn::Set(d, slopes.x[0]), lane));
+        auto const plane = hn::Add(hn::Set(d, base[0]), hn::Mul(hn::Set(d, slopes.x[0]), lane));
+        auto const key = hn::Min(hn::Max(plane, least_key), most_key);
         auto const mask = hn::And(hn::RebindMask(d, covered), hn::Gt(key, hn::LoadU(d, writer.keys() + at)));
         if (!hn::AllFalse(d, mask)) {
           auto on_edge = hn::FirstN(d, 0);

@@ -117,6 +117,15 @@ void TriangleBins::clip(Part& part, std::size_t triangle) const {
     for (std::size_t c = 0; c < 4; ++c) v[Row::kRows + c] = vertices_[i].values[ScreenVertex::nearness + c];
     polygon.push_back(v);
   }
+  auto const corners = polygon;
+  // Corners that stay lie where their other triangles have them, which single precision has placed.
+  auto const place = [&](ClipVertex const& v) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      ScreenVertex const& placed = vertices_[static_cast<std::size_t>(mesh_->corners[3 * triangle + k])];
+      if (v == corners[k] && placed.x != kBeyond) return placed;
+    }
+    return on_screen(v, transform_.perspective);
+  };
   double const near = transform_.near;
   if (transform_.perspective) polygon = clipped_by(polygon, [&](ClipVertex const& v) { return v[Row::w] - near; });
   polygon = clipped_by(polygon, [&](ClipVertex const& v) { return v[Row::u] + kGuardBand * v[Row::w]; });
@@ -124,9 +133,7 @@ void TriangleBins::clip(Part& part, std::size_t triangle) const {
   polygon = clipped_by(polygon, [&](ClipVertex const& v) { return v[Row::v] + kGuardBand * v[Row::w]; });
   polygon = clipped_by(polygon, [&](ClipVertex const& v) { return (height_ + kGuardBand) * v[Row::w] - v[Row::v]; });
   for (std::size_t i = 2; i < polygon.size(); ++i) {
-    Clipped clipped{{on_screen(polygon[0], transform_.perspective), on_screen(polygon[i - 1], transform_.perspective),
-                     on_screen(polygon[i], transform_.perspective)},
-                    mesh_->labels[triangle]};
+    Clipped clipped{{place(polygon[0]), place(polygon[i - 1]), place(polygon[i])}, mesh_->labels[triangle]};
     auto const entry = kClipped + static_cast<std::uint32_t>(part.clipped.size());
     auto& [a, b, c] = clipped.corners;
     std::int64_t const area2 = std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
