@@ -85,14 +85,15 @@ TEST(BackEnds, DrawTheSameFromAnywhere) {
     double psnr = 50;
   };
   // Where triangles are a twentieth of a pixel, 1/256 pixel of rounding changes their slopes by a tenth, and with them
-  // the level of detail, each time otherwise: seen where the object is a few pixels, but has more than one.
+  // the level of detail, each time otherwise: seen where the object is a few pixels, or one.
   for (Place const& place :
        {Place{"at a view", kCamera, *scene().set.views[2].object_from_camera, 2000},
         Place{"between views", kCamera, around(23, 8), 2000}, Place{"near a step", kCamera, around(70, 35, 2.5), 4000},
         Place{"below all views", kCamera, around(100, -80), 2000},
         Place{"orthographic", Camera::orthographic(160, 120, 0.018, 0.02, 80, 60), around(-30, 12), 5000},
         Place{"a texel covers the window", Camera::perspective(64, 48, 40000, 40000, 31, 23), around(23, 8), 64 * 48},
-        Place{"a few pixels", kCamera, around(23, 8, 60), 10, 35}, Place{"one pixel", kCamera, around(23, 8, 200), 1},
+        Place{"a few pixels", kCamera, around(23, 8, 60), 10, 35},
+        Place{"one pixel", kCamera, around(23, 8, 200), 1, 35},
         Place{"inside the ball", kCamera, look_at({0.1, 0.2, 0.1}, {0, 0, 1}), 0, -1},
         Place{"close to the surface", kCamera, look_at({0, 0.3, 1.3}, {-0.8, 0.3, 0.2}), 4000}}) {
     SCOPED_TRACE(place.name);

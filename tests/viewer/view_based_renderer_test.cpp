@@ -283,16 +283,16 @@ TEST_P(SoftZPixels, ASheetSeenFromItsEdgeIsALineOrNothing) {
 
 TEST_P(SoftZPixels, ReliabilityFadesWithTheWeight) {
   // From a sample in front that is hidden by the one behind to one that hides it there is no step: between half and
-  // the whole of a tenth of the other's rank.
+  // the whole of a twentieth of the other's rank (the default reliability_ratio).
   double last = 255;
-  for (double const cosine : {0.03, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.2}) {
+  for (double const cosine : {0.015, 0.025, 0.03, 0.035, 0.04, 0.045, 0.05, 0.1}) {
     auto const pixel = center_of(draw(two_layers(0.5, float(cosine)), small_camera(), around(0, 0)));
     EXPECT_LE(pixel[1], last);
     last = pixel[1];
-    if (cosine <= 0.05) {
+    if (cosine <= 0.025) {
       EXPECT_GT(pixel[1], 250);
     }
-    if (cosine >= 0.1) {
+    if (cosine >= 0.05) {
       EXPECT_EQ(pixel, cv::Vec4b(0, 0, 255, 255));
     }
   }
@@ -346,8 +346,9 @@ TEST_P(Rendering, FillViewsShowWhereNoMainViewHasASample) {
   auto const without = draw(scene, small_camera(), around(20, 0), none);
   auto const with = draw(scene, small_camera(), around(20, 0));
   EXPECT_GT(drawn_pixels(with.color), 1.5 * static_cast<double>(drawn_pixels(without.color)));
-  // Where the main views have good samples the picture is theirs alone.
-  EXPECT_EQ(center_of(with), center_of(without));
+  // Where the main views have good samples the others count a tenth of their fill, which is below 1, over weights that
+  // sum to 1: of colours that differ by less than 40 levels here, three views at most 40 · 0.3 / 1.3.
+  EXPECT_LT(cv::norm(center_of(with), center_of(without), cv::NORM_INF), 10);
   EXPECT_GT(psnr_to_truth(with, sphere(Vector3d::Zero(), 1), small_camera(), around(20, 0)), 25);
 }
 
@@ -420,8 +421,7 @@ TEST_P(Rendering, MovingTheEyeALittleChangesThePictureALittle) {
       int worse = 0;
       for (int y = 0; y < a.color.rows; ++y) {
         for (int x = 0; x < a.color.cols; ++x) {
-          if (a.color(y, x)[3] == b.color(y, x)[3] && greatest_difference(a.color(y, x), b.color(y, x)) > 3)
-            ++worse;
+          if (a.color(y, x)[3] == b.color(y, x)[3] && greatest_difference(a.color(y, x), b.color(y, x)) > 3) ++worse;
         }
       }
       ASSERT_LT(worse, 40) << i;  // outlines of views within the ball

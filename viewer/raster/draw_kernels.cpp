@@ -127,6 +127,9 @@ void TransformVertices(VertexArrays const& vertices, ScreenTransform const& tran
     } else {
       for (int c = 0; c < 3; ++c) hn::Store(one, d, value[ScreenVertex::red + c]);
     }
+    for (int j = ScreenVertex::nearness; j < ScreenVertex::kValues; ++j) {
+      hn::Store(hn::Mul(hn::Load(d, value[j]), inverse), d, value[j]);
+    }
     std::size_t const count = std::min(lanes, end - i);
     for (std::size_t k = 0; k < count; ++k) {
       out[i + k].x = x[k];
@@ -173,7 +176,9 @@ class TextureWriter {
                            HWY_ATTR { return hn::Add(hn::Set(d, base[k]), hn::Mul(hn::Set(d, slopes.x[k]), lane)); };
     auto const inverse = hn::Div(hn::Set(d, 1.0F), plane(3));
     auto const s = hn::Mul(plane(1), inverse), t = hn::Mul(plane(2), inverse);
-    auto const cosine = hn::Mul(plane(ScreenVertex::nearness), hn::Set(d, static_cast<float>(label)));
+    // What was divided by the depth for the way over the screen.
+    auto const depth = target_.perspective ? hn::Div(hn::Set(d, 1.0F), key) : hn::Set(d, 1.0F);
+    auto const cosine = hn::Mul(hn::Mul(plane(ScreenVertex::nearness), depth), hn::Set(d, static_cast<float>(label)));
     auto packed = hn::ShiftLeft<16>(hn::BitCast(
         du, hn::ConvertTo(di, hn::Min(hn::Max(hn::Add(cosine, hn::Set(d, 0.5F)), hn::Zero(d)), hn::Set(d, 65535.0F)))));
     if (target_.largest_lod > 0) {
@@ -199,7 +204,7 @@ class TextureWriter {
     store(target_.t, t);
     if (target_.lit) {
       auto const bits = [&](int k) HWY_ATTR {
-        auto const share = hn::Min(hn::Max(plane(k), hn::Zero(d)), hn::Set(d, 2.0F));
+        auto const share = hn::Min(hn::Max(hn::Mul(plane(k), depth), hn::Zero(d)), hn::Set(d, 2.0F));
         return hn::BitCast(du, hn::ConvertTo(di, hn::Add(hn::Mul(share, hn::Set(d, 511.5F)), hn::Set(d, 0.5F))));
       };
       auto const light = hn::Or(hn::Or(bits(ScreenVertex::red), hn::ShiftLeft<10>(bits(ScreenVertex::green))),

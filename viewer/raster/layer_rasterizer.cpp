@@ -100,7 +100,8 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
                             words + kTilePixels,
                             layers[i].largest_lod,
                             layers[i].wireframe,
-                            layers[i].transform.lit};
+                            layers[i].transform.lit,
+                            layers[i].transform.perspective};
       }
       compose(tile);
     });

@@ -10,8 +10,9 @@ namespace scanview {
 
 /// A vertex on the screen. x, y: 1/256 pixel, the centre of pixel (0, 0) at 0; kBeyond in x: behind the near plane or
 /// outside the guard band, so that its triangles must be clipped. What is linear on the screen: key, by which depths
-/// are compared, nearer is greater: 1/z (perspective) or −z (orthographic); s, t, w: homogeneous texture coordinates in
-/// texels, divided by z.
+/// are compared, nearer is greater: 1/z (perspective) or −z (orthographic); and, divided by z where the camera is a
+/// perspective one, s, t, w: homogeneous texture coordinates in texels; nearness: how close the view's camera comes to
+/// seeing the point from this side; red, green, blue: the light there, as a share of what the view's camera saw.
 struct ScreenVertex {
   std::int32_t x, y;
   enum Value { key, s, t, w, nearness, red, green, blue, kValues };
@@ -72,6 +73,7 @@ struct TextureTarget {
   float largest_lod = 0;
   bool wireframe = false;
   bool lit = false;
+  bool perspective = true;
 };
 struct IdTarget {
   float* key;

@@ -38,13 +38,12 @@ std::vector<ClipVertex> clipped_by(std::vector<ClipVertex> const& polygon, Dista
 ScreenVertex on_screen(ClipVertex const& v, bool perspective) {
   using Row = ScreenTransform::Row;
   double const inverse = perspective ? 1 / v[Row::w] : 1;
-  auto const attribute = [&](Row row) { return static_cast<float>(v[row] * inverse); };
+  auto const attribute = [&](int row) { return static_cast<float>(v[static_cast<std::size_t>(row)] * inverse); };
   return {static_cast<std::int32_t>(std::lround(256 * v[Row::u] * inverse)),
           static_cast<std::int32_t>(std::lround(256 * v[Row::v] * inverse)),
           {perspective ? static_cast<float>(inverse) : static_cast<float>(-v[Row::depth]), attribute(Row::s),
-           attribute(Row::t), attribute(Row::texture_w), static_cast<float>(v[Row::kRows]),
-           static_cast<float>(v[Row::kRows + 1]), static_cast<float>(v[Row::kRows + 2]),
-           static_cast<float>(v[Row::kRows + 3])}};
+           attribute(Row::t), attribute(Row::texture_w), attribute(Row::kRows), attribute(Row::kRows + 1),
+           attribute(Row::kRows + 2), attribute(Row::kRows + 3)}};
 }
 
 }  // namespace
@@ -114,7 +113,11 @@ void TriangleBins::clip(Part& part, std::size_t triangle) const {
       double const* const row = transform_.rows[r];
       v[r] = row[0] * points.x[i] + row[1] * points.y[i] + row[2] * points.z[i] + row[3];
     }
-    for (std::size_t c = 0; c < 4; ++c) v[Row::kRows + c] = vertices_[i].values[ScreenVertex::nearness + c];
+    for (std::size_t c = 0; c < 4; ++c) {
+      double const value = vertices_[i].values[ScreenVertex::nearness + c];
+      double const undivided = transform_.perspective ? value * v[Row::w] : value;
+      v[Row::kRows + c] = std::isfinite(undivided) ? undivided : 1;  // of a corner in the eye's plane
+    }
     polygon.push_back(v);
   }
   auto const corners = polygon;

@@ -30,8 +30,8 @@ uniform bool lit;
 uniform vec3 light[8];             // CameraLight::coefficients
 uniform mat4 sample_from_source;   // rows: s w, t w, w (texture coordinates), depth in the rendering camera
 out vec4 texture_and_depth;
-noperspective out float nearness;
-noperspective out vec3 relight;
+out float nearness;
+out vec3 relight;
 
 void main() {
   gl_Position = clip_from_source * vec4(p_source, 1.0);
@@ -55,8 +55,8 @@ void main() {
 
 constexpr char kFragmentShader[] = R"(#version 330 core
 in vec4 texture_and_depth;
-noperspective in float nearness;
-noperspective in vec3 relight;
+in float nearness;
+in vec3 relight;
 uniform sampler2D feather;
 uniform samplerBuffer cos_phi;
 uniform vec2 size;                 // of the picture
