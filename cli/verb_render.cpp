@@ -6,9 +6,11 @@
 #include <memory>
 
 #include "acquire/scan_set_file.h"
+#include "base/animated_png.h"
 #include "base/error.h"
 #include "base/image_file.h"
 #include "cli/stages.h"
+#include "viewer/blend/composite_renderer.h"
 #include "viewer/blend/supersampling.h"
 #include "viewer/select/camera_path.h"
 #include "viewer/view_based/view_based_renderer.h"
@@ -17,10 +19,17 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
+/// Another set in the same scene.
+struct Companion {
+  std::shared_ptr<ViewLibrary> library;
+  Eigen::Isometry3d scene_from_object;
+};
+
 struct RenderArguments {
   fs::path set, output, path;
   int orbit = 0;
-  bool halfway = false;
+  bool halfway = false, film = false;
+  std::vector<std::string> with;
   std::string like, size = "800x600", back_end = "cpu";
   int supersampling = 2;
   ViewBasedOptions options;
@@ -33,6 +42,18 @@ std::pair<int, int> parse_size(std::string const& text) {
       height > 16384)
     throw Error(ErrorCode::usage, {}, fmt::format("--size {}: expected WIDTHxHEIGHT, 1 to 16384 each", text));
   return {width, height};
+}
+
+/// "SET", or "SET@FILE" with a JSON list of 16 numbers: scene_from_object, row by row, the scene being the first set's
+/// object coordinates.
+Companion read_companion(std::string const& text, Context& context) {
+  auto const at = text.rfind('@');
+  Companion companion{ViewLibrary::open(text.substr(0, at), context), Eigen::Isometry3d::Identity()};
+  if (at != std::string::npos) {
+    fs::path const file = text.substr(at + 1);
+    companion.scene_from_object = pose_from_json(read_json(file), file, "scene_from_object");
+  }
+  return companion;
 }
 
 std::vector<PathCamera> cameras(RenderArguments const& arguments, ViewLibrary const& library) {
@@ -49,9 +70,22 @@ void render(RenderArguments const& arguments, Session& session) {
   auto const library = ViewLibrary::open(arguments.set, context);
   auto const path = cameras(arguments, *library);
   auto const gl = arguments.back_end == "gl" ? make_offscreen_context() : nullptr;
-  auto const renderer = gl ? make_gl_renderer(*gl, library, arguments.options)
-                           : make_cpu_renderer(library, arguments.options, context.threads);
-  SupersamplingRenderer smooth(*renderer, arguments.supersampling);
+  auto const make = [&](std::shared_ptr<ViewLibrary> const& of) {
+    return gl ? make_gl_renderer(*gl, of, arguments.options)
+              : make_cpu_renderer(of, arguments.options, context.threads);
+  };
+  auto first = make(library);
+  ViewBasedRenderer const& timed = *first;
+  std::vector<CompositeRenderer::Part> parts;
+  parts.push_back({std::move(first), Eigen::Isometry3d::Identity()});
+  std::vector<std::shared_ptr<ViewLibrary>> libraries{library};
+  for (auto const& text : arguments.with) {
+    Companion const companion = read_companion(text, context);
+    libraries.push_back(companion.library);
+    parts.push_back({make(companion.library), companion.scene_from_object});
+  }
+  CompositeRenderer scene(std::move(parts));
+  SupersamplingRenderer smooth(scene, arguments.supersampling);
   std::error_code error;
   fs::create_directories(arguments.output, error);
   if (error) throw Error(ErrorCode::io, arguments.output, "cannot create: " + error.message());
@@ -59,21 +93,27 @@ void render(RenderArguments const& arguments, Session& session) {
   session.report["frames"] = Json::array();
   session.report["back_end"] = arguments.back_end;
   std::vector<double> times;
+  std::vector<std::string> pictures;
   for (std::size_t i = 0; i < path.size(); ++i) {
     context.check_cancelled();
     auto const start = std::chrono::steady_clock::now();
     Frame const frame = smooth.render(path[i].camera, path[i].object_from_camera);
     times.push_back(1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     std::string const file = path[i].name + ".png";
-    write_file(arguments.output / file, encode_png(frame.color));
+    std::string png = encode_png(frame.color);
+    write_file(arguments.output / file, png);
+    if (arguments.film) pictures.push_back(std::move(png));
     write_depth_exr(arguments.output / (path[i].name + ".exr"), frame.depth);
-    session.report["frames"].push_back(
-        {{"file", file}, {"milliseconds", times.back()}, {"stages", renderer->stages()}});
+    session.report["frames"].push_back({{"file", file}, {"milliseconds", times.back()}, {"stages", timed.stages()}});
     context.progress("render", i + 1, path.size());
   }
   std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
-  for (auto const& failure : library->failures()) context.warn(failure);
-  if (!library->failures().empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
+  constexpr int kFilmMilliseconds = 80;
+  if (arguments.film) write_file(arguments.output / "film.png", animated_png(pictures, kFilmMilliseconds));
+  for (auto const& one : libraries) {
+    for (auto const& failure : one->failures()) context.warn(failure);
+    if (!one->failures().empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
+  }
   session.report["fps_median"] = times.empty() ? 0 : 1e3 / times[times.size() / 2];
 }
 
@@ -92,6 +132,11 @@ void add_render(CLI::App& app, Session& session) {
   which->add_option("--like", arguments->like, "From the camera of this view");
   which->require_option(1);
   verb->add_option("--size", arguments->size, "WIDTHxHEIGHT");
+  verb->add_option(
+      "--with", arguments->with,
+      "Another set in the same scene: SET, or SET@FILE with its place (a JSON list of 16 numbers, row by row, "
+      "to the first set's object coordinates); may be repeated");
+  verb->add_flag("--film", arguments->film, "Also all pictures as one animated PNG, film.png");
   verb->add_option("--back-end", arguments->back_end, "cpu, or gl (OpenGL 3.3 without a display)")
       ->check(CLI::IsMember({"cpu", "gl"}));
   verb->add_option("--supersampling", arguments->supersampling, "Samples a pixel of a border, each way")

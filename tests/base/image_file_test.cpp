@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "base/animated_png.h"
 #include "base/files.h"
 #include "base/gray_png.h"
 #include "tests/expect_error.h"
@@ -100,6 +101,26 @@ TEST(ImageFile, WhatIsNoPictureIsRefused) {
   TemporaryFolder folder;
   write_file(folder.path() / "text.png", "hello");
   EXPECT_SCANVIEW_ERROR(read_image(folder.path() / "text.png"), ErrorCode::bad_input, "not a picture");
+}
+
+TEST(AnimatedPng, IsAPngOfItsFirstFrameThatHoldsTheOthers) {
+  cv::Mat3b const red(4, 6, cv::Vec3b(0, 0, 255)), blue(4, 6, cv::Vec3b(255, 0, 0));
+  std::string const film = animated_png({encode_png(red), encode_png(blue), encode_png(red)}, 40);
+  ASSERT_TRUE(is_whole_png(film));
+  cv::Mat const first = cv::imdecode(std::vector<char>(film.begin(), film.end()), cv::IMREAD_COLOR);
+  EXPECT_EQ(cv::norm(first, red, cv::NORM_INF), 0);
+  // One control chunk a frame, and one data chunk at least of each frame but the first.
+  auto const count = [&](std::string const& type) {
+    std::size_t found = 0;
+    for (std::size_t at = film.find(type); at != std::string::npos; at = film.find(type, at + 4)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("acTL"), 1U);
+  EXPECT_EQ(count("fcTL"), 3U);
+  EXPECT_GE(count("fdAT"), 2U);
+  EXPECT_THROW(animated_png({}, 40), std::logic_error);
+  EXPECT_THROW(animated_png({encode_png(red), encode_png(cv::Mat3b(3, 6, cv::Vec3b()))}, 40), std::logic_error);
+  EXPECT_THROW(animated_png({"no picture"}, 40), std::logic_error);
 }
 
 }  // namespace
