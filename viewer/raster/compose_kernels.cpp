@@ -16,11 +16,11 @@ namespace scanview {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Floats = hn::CappedTag<float, 8>;
+using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 using Words = hn::RebindToUnsigned<Floats>;
 using V = hn::Vec<Floats>;
-constexpr int kMostLanes = 8;
+constexpr int kMostLanes = 16;
 constexpr int kMostLayers = 24;
 
 HWY_INLINE V Clamp(V x, float low, float high) {

@@ -159,12 +159,14 @@ struct Slopes {
   float x[ScreenVertex::kValues], y[ScreenVertex::kValues];
 };
 
+/// kLit: whether there is light to be interpolated too.
+template <bool kLit>
 class TextureWriter {
  public:
+  static constexpr int kValues = kLit ? ScreenVertex::kValues : ScreenVertex::red;
   explicit TextureWriter(TextureTarget const& target) : target_(target) {}
   float* keys() const { return target_.key; }
   bool wants_edges() const { return target_.wireframe; }
-  int values() const { return target_.lit ? ScreenVertex::kValues : ScreenVertex::red; }
 
   template <class M, class V>
   HWY_INLINE void Write(std::size_t at, M mask, V key, float const* base, V lane, Slopes const& slopes,
@@ -202,7 +204,7 @@ class TextureWriter {
     store(target_.key, key);
     store(target_.s, s);
     store(target_.t, t);
-    if (target_.lit) {
+    if constexpr (kLit) {
       auto const bits = [&](int k) HWY_ATTR {
         auto const share = hn::Min(hn::Max(hn::Mul(plane(k), depth), hn::Zero(d)), hn::Set(d, 2.0F));
         return hn::BitCast(du, hn::ConvertTo(di, hn::Add(hn::Mul(share, hn::Set(d, 511.5F)), hn::Set(d, 0.5F))));
@@ -222,10 +224,10 @@ class TextureWriter {
 
 class IdWriter {
  public:
+  static constexpr int kValues = ScreenVertex::s;
   explicit IdWriter(IdTarget const& target) : target_(target) {}
   float* keys() const { return target_.key; }
   bool wants_edges() const { return false; }
-  int values() const { return ScreenVertex::s; }
 
   template <class M, class V>
   HWY_INLINE void Write(std::size_t at, M mask, V key, float const*, V, Slopes const&, std::uint32_t label, M) const {
@@ -281,8 +283,8 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
   float const scale = 256.0F / static_cast<float>(area2);
   float const a_x = static_cast<float>(a.x) / 256, a_y = static_cast<float>(a.y) / 256;
   Slopes slopes;
-  float at_left[ScreenVertex::kValues];
-  int const values = writer.values();
+  float at_left[Writer::kValues];
+  constexpr int values = Writer::kValues;
   for (int k = 0; k < values; ++k) {
     float const at_a = a.values[k], d1 = b.values[k] - at_a, d2 = c.values[k] - at_a;
     slopes.x[k] = (d1 * dy2 - d2 * dy1) * scale;
@@ -311,7 +313,7 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
     auto e0 = hn::Add(hn::Set(di, start[0] + step_y[0] * down), step0);
     auto e1 = hn::Add(hn::Set(di, start[1] + step_y[1] * down), step1);
     auto e2 = hn::Add(hn::Set(di, start[2] + step_y[2] * down), step2);
-    float base[ScreenVertex::kValues];
+    float base[Writer::kValues];
     for (int k = 0; k < values; ++k) base[k] = at_left[k] + slopes.y[k] * (static_cast<float>(y) - a_y);
     auto lane = hn::Iota(d, 0);  // pixels from `left`: exact, so that sums do not depend on the vector's width
     std::size_t at = static_cast<std::size_t>((y - area.top) * kTileStride + (left - area.left));
@@ -342,8 +344,13 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
 
 void DrawTextured(ScreenTriangle const* triangles, std::size_t count, TileArea const& area,
                   TextureTarget const& target) {
-  TextureWriter const writer(target);
-  for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+  if (target.lit) {
+    TextureWriter<true> const writer(target);
+    for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+  } else {
+    TextureWriter<false> const writer(target);
+    for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+  }
 }
 
 void DrawIds(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target) {

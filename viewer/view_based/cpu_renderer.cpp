@@ -40,9 +40,14 @@ class CpuRenderer final : public ViewBasedRenderer {
 
   Frame draw(std::vector<UsedView> const& views, Camera const& camera,
              Eigen::Isometry3d const& object_from_camera) override {
-    Frame frame;
-    frame.color.create(camera.height(), camera.width());
-    frame.depth.create(camera.height(), camera.width());
+    // The last frame's memory, where its receiver is done with it: fresh pages cost as much as a view.
+    if (last_.color.u == nullptr || last_.color.u->refcount != 1 || last_.depth.u->refcount != 1 ||
+        last_.color.size() != cv::Size(camera.width(), camera.height())) {
+      last_ = Frame();
+      last_.color.create(camera.height(), camera.width());
+      last_.depth.create(camera.height(), camera.width());
+    }
+    Frame const frame = last_;
     stages_ = {{"triangles", 0}, {"pixels", 0}};
     for (int y = 0; y < camera.height(); y += kBlock) {
       for (int x = 0; x < camera.width(); x += kBlock) {
@@ -108,6 +113,7 @@ class CpuRenderer final : public ViewBasedRenderer {
 
   LayerRasterizer rasterizer_;
   RasterViews views_;
+  Frame last_;
 };
 
 }  // namespace
