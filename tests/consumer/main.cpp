@@ -1,5 +1,6 @@
 // Scans a built-in object, meshes the views and renders one picture, with nothing but the installed package.
 #include <cstdio>
+#include <memory>
 
 #include "mesh/view_mesh.h"
 #include "register/alignment.h"
@@ -19,7 +20,6 @@ int main() {
   if (align(set, keep, context).object_from_camera.size() != set.views.size()) return 1;
   std::vector<ViewMesh> meshes;
   for (auto const& view : set.views) meshes.push_back(mesh_range_image(view.image, {}, context).view_mesh);
-  auto const gl = make_offscreen_context();
   auto const renderer = make_cpu_renderer(std::make_shared<scanview::ViewLibrary>(set, meshes));
   Frame const frame = renderer->render(set.views[0].image.camera, *set.views[0].object_from_camera);
   int drawn = 0;
