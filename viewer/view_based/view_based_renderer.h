@@ -21,7 +21,7 @@ struct ViewBasedOptions {
   /// pixel in front of a high confidence one is ignored").
   double reliability_ratio = 0.05;
   /// Views beyond the three that fill what these do not see (soft_z.h); 0: the paper's three only. At most 16.
-  int fill_views = 12;
+  int fill_views = 16;
   /// Views that are not used (held out).
   std::vector<std::size_t> excluded;
 

@@ -12,7 +12,12 @@
 namespace scanview {
 
 struct WindowOptions {
-  ViewBasedOptions rendering;
+  /// Fewer views that fill than elsewhere: a window must answer.
+  ViewBasedOptions rendering = [] {
+    ViewBasedOptions options;
+    options.fill_views = 6;
+    return options;
+  }();
   int width = 1024, height = 768;
   std::string title = "scanview";
   /// Where P saves scanview-NNN.png and K scanview-path-NNN.json, the first number that is free.
