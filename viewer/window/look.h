@@ -12,7 +12,7 @@ struct Look {
   bool wireframe = false;
   double threshold = 0;  ///< units
   double reliability_ratio = 0.1;
-  int fill_views = 4;
+  int fill_views = 6;
   bool operator==(Look const&) const = default;
 };
 
