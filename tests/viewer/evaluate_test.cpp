@@ -13,6 +13,7 @@
 #include "viewer/blend/exposure.h"
 #include "viewer/evaluate/held_out.h"
 #include "viewer/evaluate/image_quality.h"
+#include "viewer/evaluate/lumigraph_renderer.h"
 #include "viewer/scene.h"
 
 namespace scanview {
@@ -137,6 +138,16 @@ TEST(HeldOut, TheOnlyViewCannotBeHeldOut) {
   auto contenders = make_contenders(scene.set, std::make_shared<ViewLibrary>(scene.set, scene.meshes), {}, context);
   EXPECT_THROW(evaluate_held_out(contenders, scene.set, {0}, HoldOut::each, context), Error);
   EXPECT_THROW(evaluate_held_out(contenders, scene.set, {7}, HoldOut::each, context), Error);
+}
+
+TEST(Lumigraph, DrawsMoreViewsThanWeEverMix) {
+  // All thirty see the pole: as many layers in one pixel. (The view-based renderer draws 24 at most.)
+  auto const scene =
+      scan(sphere(Vector3d::Zero(), 1), Camera::perspective(48, 36, 45, 45, 24, 18), ring(30, 80), 0.3, 0.02);
+  auto const renderer = make_lumigraph_renderer(std::make_shared<ViewLibrary>(scene.set, scene.meshes));
+  ViewFigures const figures = compare_with_photograph(*renderer, scene.set, 4);
+  EXPECT_GT(figures.coverage, 0.99);
+  EXPECT_GT(figures.psnr_common, 30);
 }
 
 TEST(ConfidenceInterval, IsStudents) {

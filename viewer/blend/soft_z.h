@@ -50,6 +50,7 @@ struct SoftZ {
   static constexpr double kLeastQuality = 1e-4;  ///< a view that is alone at its border still shows
   double threshold = 0;                          ///< >= 0, may be infinite
   double reliability_ratio = 0.05;
+  double always = 0;     ///< need at least: kAlways · fill_rank
   bool nearest = false;  ///< the nearest sample alone, whatever its weight
   enum class Show { picture, weights, winner } show = Show::picture;
 };

@@ -212,12 +212,7 @@ void SoftZCompositor::set_weights(std::vector<LayerWeight> const& weights, SoftZ
     gl_.Uniform1fv(add_.uniform("layer_fill_rank"), count, rank.data());
     gl_.Uniform3fv(add_.uniform("layer_hue"), count, hue.front().data());
   }
-  // fill_rank(): the same for all layers.
-  double always = 0;
-  for (auto const& layer : weights) {
-    if (layer.fill > 0) always = SoftZ::kAlways * layer.fill_rank / layer.fill;
-  }
-  gl_.Uniform1f(add_.uniform("always"), static_cast<float>(always));
+  gl_.Uniform1f(add_.uniform("always"), static_cast<float>(soft_z.always));
   gl_.Uniform1i(add_.uniform("show"), static_cast<GLint>(soft_z.show));
   gl_.Uniform1i(add_.uniform("nearest"), soft_z.nearest ? 1 : 0);
   // Infinite and zero thresholds stay finite in the shader's arithmetic and mean the same.

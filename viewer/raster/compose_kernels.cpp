@@ -1,3 +1,5 @@
+#include <hwy/aligned_allocator.h>
+
 #include <algorithm>
 #include <cfloat>
 #include <limits>
@@ -21,7 +23,6 @@ using Ints = hn::RebindToSigned<Floats>;
 using Words = hn::RebindToUnsigned<Floats>;
 using V = hn::Vec<Floats>;
 constexpr int kMostLanes = 16;
-constexpr int kMostLayers = 24;
 
 HWY_INLINE V Clamp(V x, float low, float high) {
   Floats const d;
@@ -184,18 +185,28 @@ HWY_INLINE Color SampleLayer(ComposedLayer const& layer, std::size_t at, hn::Mas
   return sum;
 }
 
+using Lanes = float[kMostLanes];
+
 /// The samples of one group of pixels: compact, so that most groups cost as many layers as they have.
 struct Group {
   std::size_t count = 0;
-  std::size_t layer[kMostLayers];
-  HWY_ALIGN float quality[kMostLayers][kMostLanes];
-  HWY_ALIGN float fair_fill[kMostLayers][kMostLanes];  ///< the layer's fill times the sample's fairness
-  HWY_ALIGN float rank[kMostLayers][kMostLanes];       ///< its weight where it is decided what hides what
-  HWY_ALIGN float depth[kMostLayers][kMostLanes];
-  HWY_ALIGN float reliable[kMostLayers][kMostLanes];
-  HWY_ALIGN float seen[kMostLayers][kMostLanes];
-  HWY_ALIGN float share[kMostLayers][kMostLanes];
+  std::size_t* layer;
+  Lanes* quality;
+  Lanes* fair_fill;  ///< the layer's fill times the sample's fairness
+  Lanes* rank;       ///< its weight where it is decided what hides what
+  Lanes* depth;
+  Lanes* reliable;
+  Lanes* seen;
+  Lanes* share;
   V spread;  ///< between the nearest and the furthest sample
+
+  /// indices: one a layer; scratch: seven arrays of kMostLanes floats a layer, aligned for vectors.
+  Group(std::size_t layers, std::size_t* indices, float* scratch) : layer(indices), spread(hn::Zero(Floats())) {
+    for (Lanes** const part : {&quality, &fair_fill, &rank, &depth, &reliable, &seen, &share}) {
+      *part = reinterpret_cast<Lanes*>(scratch);
+      scratch += layers * kMostLanes;
+    }
+  }
 };
 
 HWY_INLINE void GatherGroup(ComposedLayer const* layers, std::size_t count, Composition const& how, std::size_t at,
@@ -325,11 +336,12 @@ HWY_INLINE hn::Vec<Words> Encode(V linear) {
 }
 
 void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition const& how, TileArea const& area,
-                   std::uint32_t* color, std::size_t color_stride, float* depth, std::size_t depth_stride) {
+                   std::uint32_t* color, std::size_t color_stride, float* depth, std::size_t depth_stride,
+                   std::size_t* indices, float* scratch) {
   Floats const d;
   Words const du;
   std::size_t const lanes = hn::Lanes(d);
-  Group group;
+  Group group(count, indices, scratch);
   HWY_ALIGN std::uint32_t last_colors[kMostLanes];
   HWY_ALIGN float last_depths[kMostLanes];
   std::size_t const columns = static_cast<std::size_t>(area.right - area.left);
@@ -422,7 +434,16 @@ void measure_quality(ComposedLayer const& layer, Composition const& how, TileAre
 
 void compose_layers(ComposedLayer const* layers, std::size_t count, Composition const& how, TileArea const& area,
                     std::uint32_t* color, std::size_t color_stride, float* depth, std::size_t depth_stride) {
-  HWY_DYNAMIC_DISPATCH(ComposeLayers)(layers, count, how, area, color, color_stride, depth, depth_stride);
+  // Seven arrays of a vector of the widest kind.
+  constexpr std::size_t kScratchFloats = 7 * 16;
+  thread_local std::vector<std::size_t> indices;
+  thread_local hwy::AlignedFreeUniquePtr<float[]> scratch;
+  if (indices.size() < count) {
+    indices.resize(count);
+    scratch = hwy::AllocateAligned<float>(kScratchFloats * count);
+  }
+  HWY_DYNAMIC_DISPATCH(ComposeLayers)
+  (layers, count, how, area, color, color_stride, depth, depth_stride, indices.data(), scratch.get());
 }
 
 }  // namespace scanview

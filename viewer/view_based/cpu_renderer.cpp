@@ -21,6 +21,7 @@ Composition composition(SoftZ const& soft_z, Camera const& camera) {
   how.good_at_zero = static_cast<float>(SoftZ::kGoodAtZero);
   how.good_quality = static_cast<float>(SoftZ::kGoodQuality);
   how.fair_feather = static_cast<float>(SoftZ::kFairFeather);
+  how.always = static_cast<float>(soft_z.always);
   how.agree = true;
   how.least_weight = static_cast<float>(SoftZ::kLeastQuality);
   how.nearest = soft_z.nearest;
@@ -93,8 +94,7 @@ class CpuRenderer final : public ViewBasedRenderer {
       compose.feather = options().feather;
       composed.push_back(compose);
     }
-    Composition how = composition(soft_z(), camera);
-    how.always = static_cast<float>(SoftZ::kAlways * rank);
+    Composition const how = composition(soft_z(used), camera);
     rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
       auto of_tile = composed;
       for (std::size_t i = 0; i < of_tile.size(); ++i) {

@@ -72,7 +72,7 @@ class GlRenderer final : public ViewBasedRenderer {
       gpu.place(camera, object_from_camera, pictures.emplace_back());
     }
     // OpenGL works asynchronously: only the whole can be timed.
-    Frame frame = gpu_->compositor.compose(gpu_->targets, weights, pictures, soft_z());
+    Frame frame = gpu_->compositor.compose(gpu_->targets, weights, pictures, soft_z(views));
     std::chrono::duration<double, std::milli> const took = std::chrono::steady_clock::now() - start;
     stages_ = {{"frame", took.count()}};
     return frame;

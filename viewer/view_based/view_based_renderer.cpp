@@ -101,9 +101,14 @@ std::vector<UsedView> ViewBasedRenderer::view_weights(Camera const& camera,
   return views;
 }
 
-SoftZ ViewBasedRenderer::soft_z() const {
-  return {options_.threshold, options_.reliability_ratio, options_.visibility == ViewBasedOptions::Visibility::nearest,
-          options_.show};
+SoftZ ViewBasedRenderer::soft_z(std::vector<UsedView> const& views) const {
+  SoftZ how;
+  how.threshold = options_.threshold;
+  how.reliability_ratio = options_.reliability_ratio;
+  how.always = SoftZ::kAlways * fill_rank(views);
+  how.nearest = options_.visibility == ViewBasedOptions::Visibility::nearest;
+  how.show = options_.show;
+  return how;
 }
 
 Frame ViewBasedRenderer::render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) {

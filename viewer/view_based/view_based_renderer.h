@@ -81,7 +81,8 @@ class ViewBasedRenderer : public Renderer {
   /// Gets what the back end needs of a view; false where it failed or, unless `wait`, is not there yet.
   virtual bool ready(std::size_t view, bool wait) = 0;
 
-  SoftZ soft_z() const;
+  /// How these views are mixed.
+  SoftZ soft_z(std::vector<UsedView> const& views) const;
   /// Median angle between a used view and its nearest neighbour, from the centre; radians.
   double spacing() const { return spacing_; }
 

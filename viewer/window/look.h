@@ -11,7 +11,7 @@ struct Look {
   SoftZ::Show show = SoftZ::Show::picture;
   bool wireframe = false;
   double threshold = 0;  ///< units
-  double reliability_ratio = 0.1;
+  double reliability_ratio = 0.05;
   int fill_views = 6;
   bool operator==(Look const&) const = default;
 };
