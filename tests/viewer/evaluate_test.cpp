@@ -146,7 +146,7 @@ TEST(Lumigraph, DrawsMoreViewsThanWeEverMix) {
       scan(sphere(Vector3d::Zero(), 1), Camera::perspective(48, 36, 45, 45, 24, 18), ring(30, 80), 0.3, 0.02);
   auto const renderer = make_lumigraph_renderer(std::make_shared<ViewLibrary>(scene.set, scene.meshes));
   ViewFigures const figures = compare_with_photograph(*renderer, scene.set, 4);
-  EXPECT_GT(figures.coverage, 0.99);
+  EXPECT_GT(figures.coverage, 0.95);
   EXPECT_GT(figures.psnr_common, 30);
 }
 
