@@ -59,9 +59,11 @@ Companion read_companion(std::string const& text, Context& context) {
 std::vector<PathCamera> cameras(RenderArguments const& arguments, ViewLibrary const& library) {
   ScanSet const& set = library.set();
   auto const [width, height] = parse_size(arguments.size);
-  if (arguments.orbit > 0) return orbit_path(set, orbit_frame(set, library.radius()), arguments.orbit, width, height);
-  if (arguments.halfway) return halfway_path(set, orbit_frame(set, library.radius()), width, height);
-  if (!arguments.path.empty()) return read_camera_path(arguments.path, set, width, height);
+  // The library has no depths to tell the object's size from.
+  OrbitFrame const frame = orbit_frame(set, library.radius());
+  if (arguments.orbit > 0) return orbit_path(set, frame, arguments.orbit, width, height);
+  if (arguments.halfway) return halfway_path(set, frame, width, height);
+  if (!arguments.path.empty()) return read_camera_path(arguments.path, set, frame, width, height);
   return {camera_like(set, arguments.like, width, height)};
 }
 

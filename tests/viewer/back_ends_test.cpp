@@ -19,13 +19,6 @@ namespace {
 using namespace test;
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
-constexpr double kDegree = std::numbers::pi / 180;
-
-Isometry3d around(double azimuth_deg, double elevation_deg, double distance = 4) {
-  double const a = azimuth_deg * kDegree, e = elevation_deg * kDegree;
-  return look_at(distance * Vector3d(std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a)),
-                 Vector3d::Zero());
-}
 
 /// A ball with a smaller one in front of a part of it, so that depths have steps; about it eight views.
 Scene const& scene() {

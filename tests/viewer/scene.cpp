@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 namespace scanview::test {
@@ -67,6 +68,13 @@ Eigen::Isometry3d look_at(Eigen::Vector3d const& eye, Eigen::Vector3d const& tar
   pose.linear().col(2) = forward;
   pose.translation() = eye;
   return pose;
+}
+
+Eigen::Isometry3d around(double azimuth_deg, double elevation_deg, double distance) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  double const a = azimuth_deg * kDegree, e = elevation_deg * kDegree;
+  return look_at(distance * Eigen::Vector3d(std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a)),
+                 Eigen::Vector3d::Zero());
 }
 
 View capture(Surface const& surface, Camera const& camera, Eigen::Isometry3d const& object_from_camera,

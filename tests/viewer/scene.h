@@ -31,6 +31,9 @@ Surface together(std::vector<Surface> surfaces);
 Eigen::Isometry3d look_at(Eigen::Vector3d const& eye, Eigen::Vector3d const& target,
                           Eigen::Vector3d const& up = Eigen::Vector3d::UnitY());
 
+/// Looking at the origin: azimuth 0 is +z, elevation towards +y.
+Eigen::Isometry3d around(double azimuth_deg, double elevation_deg, double distance = 4);
+
 /// What an ideal scanner gives: depth and colour of every pixel's centre.
 View capture(Surface const& surface, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
              std::string const& name);

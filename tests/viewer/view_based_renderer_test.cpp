@@ -21,12 +21,6 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 Camera small_camera() { return Camera::perspective(160, 120, 150, 155, 83.25, 56.5); }
 
-Isometry3d around(double azimuth_deg, double elevation_deg, double distance = 4) {
-  double const a = azimuth_deg * kDegree, e = elevation_deg * kDegree;
-  return look_at(distance * Vector3d(std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a)),
-                 Vector3d::Zero());
-}
-
 Scene ball(std::vector<Isometry3d> const& poses, Camera const& camera = small_camera()) {
   return scan(sphere(Vector3d::Zero(), 1), camera, poses, 0.3, 0.02);
 }

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "viewer/raster/layer_rasterizer.h"
+#include "viewer/raster/tile_composition.h"
 #include "viewer/view_based/raster_view.h"
 #include "viewer/view_based/view_transform.h"
 
@@ -55,9 +55,7 @@ class LumigraphRenderer final : public HeldOutRenderer {
       View const& of = library_->set().views[view];
       sources.push_back({of.image.camera, object_from_camera.inverse() * *of.object_from_camera});
     }
-    Frame frame;
-    frame.color.create(camera.height(), camera.width());
-    frame.depth.create(camera.height(), camera.width());
+    Frame const frame = new_frame(camera.width(), camera.height());
     // Whatever has a weight is mixed: what is hidden has been taken out before.
     Composition how;
     how.threshold = 1e30F;
@@ -66,17 +64,9 @@ class LumigraphRenderer final : public HeldOutRenderer {
     how.least_weight = static_cast<float>(SoftZ::kLeastQuality);
     how.perspective = camera.is_perspective();
     rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
-      auto of_tile = composed;
-      for (std::size_t i = 0; i < of_tile.size(); ++i) {
-        of_tile[i].samples = tile.draw(i);
-        of_tile[i].quality = tile.scratch(2 * i);
-        of_tile[i].fairness = tile.scratch(2 * i + 1);
-        measure_quality(of_tile[i], how, tile.area);
-      }
+      auto of_tile = measured_layers(tile, composed, how);
       weigh(camera, sources, tile.area, of_tile);
-      auto* const pixels = reinterpret_cast<std::uint32_t*>(frame.color.ptr(tile.area.top)) + tile.area.left;
-      compose_layers(of_tile.data(), of_tile.size(), how, tile.area, pixels, frame.color.step1() / 4,
-                     frame.depth.ptr<float>(tile.area.top) + tile.area.left, frame.depth.step1());
+      compose_tile(tile, of_tile, how, frame.color, frame.depth);
     });
     return frame;
   }

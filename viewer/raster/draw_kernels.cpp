@@ -115,10 +115,10 @@ void TransformVertices(VertexArrays const& vertices, ScreenTransform const& tran
     auto const fixed_u = hn::NearestInt(hn::IfThenElseZero(inside, u));
     hn::Store(hn::IfThenElse(hn::RebindMask(di, inside), fixed_u, hn::Set(di, kBeyond)), di, x);
     hn::Store(hn::NearestInt(hn::IfThenElseZero(inside, v)), di, y);
-    hn::Store(transform.perspective ? inverse : hn::Neg(row(ScreenTransform::depth)), d, value[0]);
-    hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[1]);
-    hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[2]);
-    hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[3]);
+    hn::Store(transform.perspective ? inverse : hn::Neg(row(ScreenTransform::depth)), d, value[ScreenVertex::key]);
+    hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[ScreenVertex::s]);
+    hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[ScreenVertex::t]);
+    hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[ScreenVertex::w]);
     hn::Store(Nearness(transform, row(ScreenTransform::x_camera), row(ScreenTransform::y_camera),
                        row(ScreenTransform::depth)),
               d, value[ScreenVertex::nearness]);
@@ -176,8 +176,8 @@ class TextureWriter {
     Ints const di;
     auto const plane = [&](int k)
                            HWY_ATTR { return hn::Add(hn::Set(d, base[k]), hn::Mul(hn::Set(d, slopes.x[k]), lane)); };
-    auto const inverse = hn::Div(hn::Set(d, 1.0F), plane(3));
-    auto const s = hn::Mul(plane(1), inverse), t = hn::Mul(plane(2), inverse);
+    auto const inverse = hn::Div(hn::Set(d, 1.0F), plane(ScreenVertex::w));
+    auto const s = hn::Mul(plane(ScreenVertex::s), inverse), t = hn::Mul(plane(ScreenVertex::t), inverse);
     // What was divided by the depth for the way over the screen.
     auto const depth = target_.perspective ? hn::Div(hn::Set(d, 1.0F), key) : hn::Set(d, 1.0F);
     auto const cosine = hn::Mul(hn::Mul(plane(ScreenVertex::nearness), depth), hn::Set(d, static_cast<float>(label)));
@@ -186,8 +186,10 @@ class TextureWriter {
     if (target_.largest_lod > 0) {
       auto const slope = [&](float of_value, float of_w, V value)
                              HWY_ATTR { return hn::Sub(hn::Set(d, of_value), hn::Mul(value, hn::Set(d, of_w))); };
-      auto const sx = slope(slopes.x[1], slopes.x[3], s), tx = slope(slopes.x[2], slopes.x[3], t);
-      auto const sy = slope(slopes.y[1], slopes.y[3], s), ty = slope(slopes.y[2], slopes.y[3], t);
+      auto const sx = slope(slopes.x[ScreenVertex::s], slopes.x[ScreenVertex::w], s),
+                 tx = slope(slopes.x[ScreenVertex::t], slopes.x[ScreenVertex::w], t);
+      auto const sy = slope(slopes.y[ScreenVertex::s], slopes.y[ScreenVertex::w], s),
+                 ty = slope(slopes.y[ScreenVertex::t], slopes.y[ScreenVertex::w], t);
       // The area of the pixel in texels: the longer side would blur whatever is seen at an angle, and views are
       // averaged anyway.
       auto const rho = hn::Mul(hn::Abs(hn::Sub(hn::Mul(sx, ty), hn::Mul(sy, tx))), hn::Mul(inverse, inverse));

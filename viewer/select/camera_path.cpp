@@ -190,8 +190,8 @@ std::vector<PathCamera> halfway_path(ScanSet const& set, OrbitFrame const& frame
   return path;
 }
 
-std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, ScanSet const& set, int width, int height) {
-  OrbitFrame const frame = orbit_frame(set);
+std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, ScanSet const& set, OrbitFrame const& frame,
+                                         int width, int height) {
   check_size(width, height);
   Json const json = read_json(file);
   auto const refuse = [&](std::string const& why) { throw Error(ErrorCode::bad_input, file, why); };

@@ -59,7 +59,12 @@ inline std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int h
 /// A camera path file: {"format": 1, "keyframes": [{"camera": {...} (optional), "object_from_camera": [16]}, ...],
 /// "between": frames from one keyframe to the next, not counting its end (default 1: keyframes only)}. Throws
 /// Error{bad_input}.
-std::vector<PathCamera> read_camera_path(std::filesystem::path const& path, ScanSet const& set, int width, int height);
+std::vector<PathCamera> read_camera_path(std::filesystem::path const& path, ScanSet const& set, OrbitFrame const& frame,
+                                         int width, int height);
+inline std::vector<PathCamera> read_camera_path(std::filesystem::path const& path, ScanSet const& set, int width,
+                                                int height) {
+  return read_camera_path(path, set, orbit_frame(set), width, height);
+}
 
 /// The film strip of an orbit.
 ReportSection render_section(std::vector<PathCamera> const& path, std::vector<Frame> const& frames);

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "viewer/raster/layer_rasterizer.h"
+#include "viewer/raster/tile_composition.h"
 #include "viewer/view_based/raster_view.h"
 #include "viewer/view_based/view_based_renderer.h"
 #include "viewer/view_based/view_transform.h"
@@ -44,9 +44,7 @@ class CpuRenderer final : public ViewBasedRenderer {
     // The last frame's memory, where its receiver is done with it: fresh pages cost as much as a view.
     if (last_.color.u == nullptr || last_.color.u->refcount != 1 || last_.depth.u->refcount != 1 ||
         last_.color.size() != cv::Size(camera.width(), camera.height())) {
-      last_ = Frame();
-      last_.color.create(camera.height(), camera.width());
-      last_.depth.create(camera.height(), camera.width());
+      last_ = new_frame(camera.width(), camera.height());
     }
     Frame const frame = last_;
     stages_ = {{"triangles", 0}, {"pixels", 0}};
@@ -96,16 +94,7 @@ class CpuRenderer final : public ViewBasedRenderer {
     }
     Composition const how = composition(soft_z(used), camera);
     rasterizer_.draw(layers, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
-      auto of_tile = composed;
-      for (std::size_t i = 0; i < of_tile.size(); ++i) {
-        of_tile[i].samples = tile.draw(i);
-        of_tile[i].quality = tile.scratch(2 * i);
-        of_tile[i].fairness = tile.scratch(2 * i + 1);
-        measure_quality(of_tile[i], how, tile.area);
-      }
-      auto* const pixels = reinterpret_cast<std::uint32_t*>(color.ptr(tile.area.top)) + tile.area.left;
-      compose_layers(of_tile.data(), of_tile.size(), how, tile.area, pixels, color.step1() / 4,
-                     depth.ptr<float>(tile.area.top) + tile.area.left, depth.step1());
+      compose_tile(tile, measured_layers(tile, composed, how), how, color, depth);
     });
     stages_["triangles"] += rasterizer_.prepare_ms();
     stages_["pixels"] += rasterizer_.tiles_ms();
