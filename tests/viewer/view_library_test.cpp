@@ -218,5 +218,23 @@ TEST_F(LibraryOfAFolder, ServesSeveralRenderersAtOnce) {
   EXPECT_FALSE(same(apart, alone));
 }
 
+TEST(ViewLibraryRadius, StrayPatchesHaveNoSay) {
+  auto scene = scan(sphere(Vector3d::Zero(), 1), Camera::perspective(80, 60, 75, 75, 40, 30),
+                    {around(0, 0), around(180, 0)}, 0.3, 0.02);
+  double const alone = ViewLibrary(scene.set, scene.meshes).radius();
+  EXPECT_NEAR(alone, 1, 0.02);
+  // As many tiny triangles far away as there are on the ball.
+  auto& mesh = scene.meshes[0];
+  for (std::size_t i = mesh.mesh.triangles.size(); i > 0; --i) {
+    int const first = static_cast<int>(mesh.mesh.vertices.size());
+    for (auto const& corner : {Vector3d(0, 0, 0), Vector3d(0, 1e-3, 0), Vector3d(1e-3, 0, 0)}) {
+      mesh.mesh.vertices.push_back((Vector3d(5, 5, 9) + corner).cast<float>());
+    }
+    mesh.mesh.triangles.emplace_back(first, first + 1, first + 2);
+    mesh.cos_phi.push_back(1);
+  }
+  EXPECT_NEAR(ViewLibrary(scene.set, scene.meshes).radius(), alone, 0.01);
+}
+
 }  // namespace
 }  // namespace scanview

@@ -17,16 +17,33 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
+/// By surface as the views saw it: stray patches have few pixels, but many vertices.
 double radius_of(ScanSet const& set, std::vector<ViewMesh> const& meshes) {
-  std::vector<double> distances;
+  struct Piece {
+    double distance, size;
+  };
+  std::vector<Piece> pieces;
+  double all = 0;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     Eigen::Isometry3d const pose = Eigen::Translation3d(-set.center) * *set.views[i].object_from_camera;
-    for (auto const& vertex : meshes[i].mesh.vertices) distances.push_back((pose * vertex.cast<double>()).norm());
+    TriangleMesh const& mesh = meshes[i].mesh;
+    auto const corner = [&](int k) { return mesh.vertices[static_cast<std::size_t>(k)].cast<double>(); };
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      auto const& triangle = mesh.triangles[t];
+      Eigen::Vector3d const a = corner(triangle[0]), b = corner(triangle[1]), c = corner(triangle[2]);
+      double const size = (b - a).cross(c - a).norm() * meshes[i].cos_phi[t];
+      pieces.push_back({(pose * ((a + b + c) / 3)).norm(), size});
+      all += size;
+    }
   }
-  if (distances.empty()) return 1;
-  auto const at = distances.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(distances.size() - 1));
-  std::nth_element(distances.begin(), at, distances.end());
-  return *at > 0 ? *at : 1;
+  std::sort(pieces.begin(), pieces.end(), [](Piece const& a, Piece const& b) { return a.distance < b.distance; });
+  double within = 0, radius = 0;
+  for (auto const& piece : pieces) {
+    radius = piece.distance;
+    within += piece.size;
+    if (within >= 0.99 * all) break;
+  }
+  return radius > 0 ? radius : 1;
 }
 
 bool nothing_to_draw(std::vector<ViewMesh> const& meshes) {

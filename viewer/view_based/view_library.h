@@ -26,7 +26,7 @@ class ViewLibrary {
   /// Views, poses, gains, budget; images may be without pixels.
   ScanSet const& set() const;
   std::vector<ViewMesh> const& meshes() const;
-  /// About the set's centre, holding 99 % of all vertices; never 0.
+  /// About the set's centre, holding 99 % of the surface that the views saw, weighed by w_cos; never 0.
   double radius() const;
 
   /// The padded picture of a view (padded_texture); read now where nobody has before. Empty where that failed: the view
