@@ -1,64 +1,64 @@
 #include "mesh/mesh_obj.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <optional>
-#include <string_view>
+#include <set>
 
-#include "mesh/mesh_builder.h"
+#include "mesh/material_library.h"
+#include "mesh/model_builder.h"
+#include "mesh/words.h"
 
 namespace scanview {
 namespace {
 
-/// Words of a line, one after the other.
-class Words {
+/// The transparent materials of the libraries that a model names.
+class Materials {
  public:
-  explicit Words(std::string_view line) : rest_(line) {}
-  std::string_view next() {
-    auto const start = rest_.find_first_not_of(" \t\r");
-    if (start == std::string_view::npos) return {};
-    rest_.remove_prefix(start);
-    std::string_view const word = rest_.substr(0, std::min(rest_.find_first_of(" \t\r"), rest_.size()));
-    rest_.remove_prefix(word.size());
-    return word;
+  Materials(std::filesystem::path const& model, ModelBuilder& builder) : model_(model), builder_(builder) {}
+
+  void add_library(std::string_view names) {
+    if (!tried_.insert(std::string(names)).second) return;
+    try {
+      transparent_.merge(transparent_materials(names, model_));
+    } catch (Error const& error) {
+      builder_.note(
+          fmt::format("materials taken for opaque: {}: {}", error.path().filename().string(), error.message()));
+    }
+  }
+  Light light(std::string_view material) const {
+    return transparent_.contains(std::string(material)) ? Light::passes : Light::stops;
   }
 
  private:
-  std::string_view rest_;
+  std::filesystem::path const& model_;
+  ModelBuilder& builder_;
+  std::set<std::string> tried_, transparent_;
 };
 
-template <typename Number>
-std::optional<Number> parse(std::string_view word) {
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  Number value{};
-  auto const [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
-  return value;
-}
+/// Of the numbers of a line. (Names may hold a #.)
+bool is_end(std::string_view word) { return word.empty() || word.front() == '#'; }
 
 }  // namespace
 
-TriangleMesh mesh_from_obj(std::string text, std::filesystem::path const& path) {
-  MeshBuilder builder(path);
+PolygonModel model_from_obj(std::string text, std::filesystem::path const& path) {
+  ModelBuilder builder(path);
+  Materials materials(path, builder);
+  Light light = Light::stops;
   for (std::size_t at = text.find('\\'); at != std::string::npos; at = text.find('\\', at + 1)) {
     std::size_t const end = text.compare(at + 1, 2, "\r\n") == 0 ? at + 2 : at + 1;
     if (end < text.size() && text[end] == '\n') std::fill(text.begin() + at, text.begin() + end + 1, ' ');
   }
   std::vector<std::int64_t> polygon;
-  std::size_t number = 0;
-  for (std::string_view rest = text; !rest.empty();) {
-    std::string_view const line = rest.substr(0, std::min(rest.find('\n'), rest.size()));
-    rest.remove_prefix(std::min(line.size() + 1, rest.size()));
-    ++number;
-    Words words(line);
+  Lines lines(text);
+  while (auto const line = lines.next()) {
+    Words words(*line);
     std::string_view const keyword = words.next();
-    auto const bad = [&](char const* what) { builder.fail(fmt::format("line {}: {}", number, what)); };
+    auto const bad = [&](char const* what) { builder.fail(fmt::format("line {}: {}", lines.number(), what)); };
     if (keyword == "v") {
       double values[6];
       int count = 0;
-      for (std::string_view word = words.next(); !word.empty() && count < 6; word = words.next()) {
-        auto const value = parse<double>(word);
+      for (std::string_view word = words.next(); !is_end(word) && count < 6; word = words.next()) {
+        auto const value = parse_number<double>(word);
         if (!value) bad("a coordinate that is no number");
         values[count++] = *value;
       }
@@ -74,15 +74,19 @@ TriangleMesh mesh_from_obj(std::string text, std::filesystem::path const& path) 
       }
     } else if (keyword == "f") {
       polygon.clear();
-      for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
-        auto const index = parse<std::int64_t>(word.substr(0, std::min(word.find('/'), word.size())));
+      for (std::string_view word = words.next(); !is_end(word); word = words.next()) {
+        auto const index = parse_number<std::int64_t>(word.substr(0, std::min(word.find('/'), word.size())));
         if (!index || *index == 0) bad("a face with an index that is none");
-        polygon.push_back(*index > 0 ? *index - 1 : std::int64_t(builder.mesh().vertices.size()) + *index);
+        polygon.push_back(*index > 0 ? *index - 1 : std::int64_t(builder.vertex_count()) + *index);
       }
-      builder.add_polygon(polygon);
+      builder.add_polygon(polygon, light);
+    } else if (keyword == "usemtl") {
+      light = materials.light(trimmed(words.rest()));
+    } else if (keyword == "mtllib") {
+      materials.add_library(trimmed(words.rest()));
     }
   }
-  if (builder.mesh().vertices.empty()) builder.fail("no vertices: not a Wavefront OBJ file");
+  if (builder.vertex_count() == 0) builder.fail("no vertices: not a Wavefront OBJ file");
   return builder.take();
 }
 

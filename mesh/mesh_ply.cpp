@@ -1,10 +1,11 @@
 #include "mesh/mesh_ply.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
-#include "mesh/mesh_builder.h"
+#include "mesh/model_builder.h"
 
 namespace scanview {
 namespace {
@@ -17,28 +18,48 @@ PlyProperty const* find_list(PlyElement const& element) {
   return nullptr;
 }
 
-/// Vertices in a row, each with the two before it a triangle, turned every other time; −1 starts anew.
-void add_strips(MeshBuilder& builder, PlyProperty const& strips) {
-  for (std::size_t row = 0; row + 1 < strips.offsets.size(); ++row) {
-    std::size_t start = strips.offsets[row];
-    for (std::size_t k = start; k < strips.offsets[row + 1]; ++k) {
-      if (strips.values[k] == -1) {
-        start = k + 1;
-        continue;
-      }
-      if (k < start + 2) continue;
-      auto a = std::int64_t(strips.values[k - 2]), b = std::int64_t(strips.values[k - 1]);
-      auto const c = std::int64_t(strips.values[k]);
-      if ((k - start) % 2 == 1) std::swap(a, b);
-      if (a != b && b != c && c != a) builder.add_triangle(a, b, c);  // strips are joined by doubled vertices
-    }
+/// Values of a property that holds indices.
+std::vector<std::int64_t> indices_of(PlyProperty const& lists, ModelBuilder const& builder) {
+  std::vector<std::int64_t> indices;
+  indices.reserve(lists.values.size());
+  for (double const value : lists.values) {
+    if (!(std::abs(value) < 1e18)) builder.fail("a face with an index that is no number");
+    indices.push_back(std::int64_t(value));
   }
+  return indices;
 }
+
+/// Where light passes: an `alpha` of less than the whole.
+class Alpha {
+ public:
+  explicit Alpha(PlyElement const& element) : property_(element.find("alpha")) {
+    if (!property_) return;
+    auto const greatest = std::max_element(property_->values.begin(), property_->values.end());
+    bool const is_real = property_->type == PlyType::float32 || property_->type == PlyType::float64;
+    if (property_->is_list || greatest == property_->values.end())
+      property_ = nullptr;
+    else if (property_->type == PlyType::uint16)
+      whole_ = 65535;
+    else if (is_real && *greatest <= 1)
+      whole_ = 1;
+    all_zero_ = property_ && *greatest == 0;
+  }
+  Light at(std::size_t row) const {
+    return property_ && !all_zero_ && property_->values[row] < whole_ ? Light::passes : Light::stops;
+  }
+  /// Some programs leave it at 0 where they mean nothing by it.
+  bool all_zero() const { return all_zero_; }
+
+ private:
+  PlyProperty const* property_;
+  double whole_ = 255;
+  bool all_zero_ = false;
+};
 
 }  // namespace
 
-TriangleMesh mesh_from_ply(PlyFile const& ply, std::filesystem::path const& path) {
-  MeshBuilder builder(path);
+PolygonModel model_from_ply(PlyFile const& ply, std::filesystem::path const& path) {
+  ModelBuilder builder(path);
   PlyElement const* const vertices = ply.find("vertex");
   if (!vertices) builder.fail("no element 'vertex'");
   std::array<PlyProperty const*, 3> position{}, color{};
@@ -51,8 +72,15 @@ TriangleMesh mesh_from_ply(PlyFile const& ply, std::filesystem::path const& path
     color[i] = vertices->find(color_names[i]);
     has_color = has_color && color[i] && !color[i]->is_list && color[i]->type == PlyType::uint8;
   }
+  auto const alpha_of = [&](PlyElement const& element) {
+    Alpha alpha(element);
+    if (alpha.all_zero()) builder.note(fmt::format("every {} has alpha 0: taken for opaque", element.name));
+    return alpha;
+  };
+  Alpha const vertex_alpha = alpha_of(*vertices);
   for (std::size_t row = 0; row < vertices->rows; ++row) {
-    builder.add_vertex(position[0]->values[row], position[1]->values[row], position[2]->values[row]);
+    builder.add_vertex(position[0]->values[row], position[1]->values[row], position[2]->values[row],
+                       vertex_alpha.at(row));
     if (has_color)
       builder.add_color(
           cv::Vec3b(uchar(color[0]->values[row]), uchar(color[1]->values[row]), uchar(color[2]->values[row])));
@@ -60,22 +88,26 @@ TriangleMesh mesh_from_ply(PlyFile const& ply, std::filesystem::path const& path
   if (PlyElement const* const faces = ply.find("face"); faces && faces->rows > 0) {
     PlyProperty const* const lists = find_list(*faces);
     if (!lists) builder.fail("faces without a list 'vertex_indices'");
-    std::vector<std::int64_t> polygon;
-    for (std::size_t row = 0; row < faces->rows; ++row) {
-      polygon.clear();
-      for (std::size_t k = lists->offsets[row]; k < lists->offsets[row + 1]; ++k) {
-        if (!(std::abs(lists->values[k]) < 1e18)) builder.fail("a face with an index that is no number");
-        polygon.push_back(std::int64_t(lists->values[k]));
-      }
-      builder.add_polygon(polygon);
-    }
+    std::vector<std::int64_t> const indices = indices_of(*lists, builder);
+    Alpha const face_alpha = alpha_of(*faces);
+    for (std::size_t row = 0; row < faces->rows; ++row)
+      builder.add_polygon(
+          std::span(indices).subspan(lists->offsets[row], lists->offsets[row + 1] - lists->offsets[row]),
+          face_alpha.at(row));
   }
   if (PlyElement const* const strips = ply.find("tristrips"); strips && strips->rows > 0) {
     PlyProperty const* const lists = find_list(*strips);
     if (!lists) builder.fail("tristrips without a list 'vertex_indices'");
-    for (double const value : lists->values)
-      if (!(std::abs(value) < 1e18)) builder.fail("a strip with an index that is no number");
-    add_strips(builder, *lists);
+    std::vector<std::int64_t> const indices = indices_of(*lists, builder);
+    constexpr std::int64_t kRestart = -1;
+    for (std::size_t row = 0; row < strips->rows; ++row)
+      for (auto begin = indices.begin() + std::ptrdiff_t(lists->offsets[row]),
+                end = indices.begin() + std::ptrdiff_t(lists->offsets[row + 1]);
+           begin != end;) {
+        auto const stop = std::find(begin, end, kRestart);
+        builder.add_strip({begin, stop});
+        begin = stop == end ? end : stop + 1;
+      }
   }
   return builder.take();
 }

@@ -17,9 +17,8 @@ struct TriangleMesh {
   void check() const;
 };
 
-/// PLY (any format; polygons are fanned, tristrips unrolled) or OBJ (positions, faces, vertex colours), by the file's
-/// ending, also gzipped (.ply.gz, .obj.gz). Throws Error{bad_input}; indices out of range and non-finite vertices are
-/// errors.
+/// The triangles of a model in any format that `read_polygon_model` reads, wound as the file has them; no triangles is
+/// no error. Throws Error{bad_input}; indices out of range and non-finite vertices are errors.
 TriangleMesh read_triangle_mesh(std::filesystem::path const& path);
 /// Binary little-endian PLY; whole or not at all.
 void write_triangle_mesh(std::filesystem::path const& path, TriangleMesh const& mesh);

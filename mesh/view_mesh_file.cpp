@@ -25,7 +25,7 @@ ViewMesh read_view_mesh(std::filesystem::path const& view_folder, Camera const& 
   view_mesh.camera = camera;
   std::filesystem::path const mesh_path = view_folder / "mesh.ply", feather_path = view_folder / "feather.png";
   PlyFile const ply = read_ply(mesh_path);
-  view_mesh.mesh = mesh_from_ply(ply, mesh_path);
+  view_mesh.mesh = model_from_ply(ply, mesh_path).mesh;
   view_mesh.mesh.colors.clear();
   auto const bad = [](std::filesystem::path const& path, std::string const& what) {
     throw Error(ErrorCode::bad_input, path, what);

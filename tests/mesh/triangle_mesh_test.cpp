@@ -113,8 +113,9 @@ TEST_F(TriangleMeshFile, BadInputIsRefusedByName) {
   expect_refused("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 2 3\n", "vertex -1");
   expect_refused("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 2 3\n", "line 4");
   expect_refused("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "2 vertices");
-  expect_refused("a.obj", "P 0.3 0.3 0.4 10 1 81924\n 1 2 3\n", "no vertices");
-  expect_refused("a.stl", "solid", "not a mesh");
+  expect_refused("a.obj", "P 0.3 0.3 0.4 10 1 81924\n 1 2 3\n", "81924 points");
+  expect_refused("a.obj", "nothing", "no vertices");
+  expect_refused("a.txt", "solid", "not a model");
   expect_refused("a.obj.gz", "v 0 0 0\n", "gzip");
 }
 
