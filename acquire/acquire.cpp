@@ -146,7 +146,7 @@ class Acquisition {
       figures.soundness[to_string(kSides[s])] = sound.to_json();
       figures.warnings.insert(figures.warnings.end(), sound.warnings.begin(), sound.warnings.end());
     }
-    auto& [left, right] = sides;
+    auto &left = sides[0], &right = sides[1];
     std::array<CodeLinks, 2> links;
     CodeImage ideal;
     CodeRows right_rows;

@@ -7,7 +7,7 @@
 
 // Eight peaks at once, a lane each: GCC's vector types, which are arrays of registers on a processor without AVX2. No
 // multiplication is fused with an addition (-ffp-contract=off), so every processor gives the same bytes.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__x86_64__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define SCANVIEW_EVERY_PROCESSOR [[gnu::target_clones("avx2", "default")]]
 #else
 #define SCANVIEW_EVERY_PROCESSOR

@@ -37,7 +37,7 @@ std::vector<TrajectoryPose> read_tum_trajectory(fs::path const& path) {
     double v[8];
     for (std::size_t i = 0; i < 8; ++i) v[i] = text_number(words[i], path, line);
     if (!std::isfinite(v[0])) fail(path, fmt::format("line {}: the time is not finite", line));
-    poses.push_back(judged(v[0], [&] {
+    poses.push_back(judged(v[0], [&, line = line] {
       return pose_from_quaternion({v[7], v[4], v[5], v[6]}, {v[1], v[2], v[3]}, path,
                                   fmt::format("the pose of line {}", line));
     }));
