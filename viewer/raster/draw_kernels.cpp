@@ -85,37 +85,65 @@ void Relight(VertexArrays const& vertices, ScreenTransform const& transform, std
   }
 }
 
+/// Where vertices lie on the screen; u and v in 1/256 pixel.
+struct PlacedLanes {
+  hn::Vec<Floats> u, v, w, inverse, key;
+};
+
+/// A row of a transform, at eight points.
+HWY_INLINE hn::Vec<Floats> Row(ScreenTransform const& transform, int r, hn::Vec<Floats> x, hn::Vec<Floats> y,
+                               hn::Vec<Floats> z) {
+  Floats const d;
+  double const* const m = transform.rows[r];
+  auto const coefficient = [&](int c) HWY_ATTR { return hn::Set(d, static_cast<float>(m[c])); };
+  auto const xy = hn::Add(hn::Mul(coefficient(0), x), hn::Mul(coefficient(1), y));
+  return hn::Add(hn::Add(xy, hn::Mul(coefficient(2), z)), coefficient(3));
+}
+
+HWY_INLINE PlacedLanes Place(ScreenTransform const& transform, hn::Vec<Floats> x, hn::Vec<Floats> y,
+                             hn::Vec<Floats> z) {
+  Floats const d;
+  auto const one = hn::Set(d, 1.0F), subpixels = hn::Set(d, 256.0F);
+  PlacedLanes placed;
+  placed.w = Row(transform, ScreenTransform::w, x, y, z);
+  placed.inverse = transform.perspective ? hn::Div(one, placed.w) : one;
+  placed.u = hn::Mul(hn::Mul(Row(transform, ScreenTransform::u, x, y, z), placed.inverse), subpixels);
+  placed.v = hn::Mul(hn::Mul(Row(transform, ScreenTransform::v, x, y, z), placed.inverse), subpixels);
+  placed.key = transform.perspective ? placed.inverse : hn::Neg(Row(transform, ScreenTransform::depth, x, y, z));
+  return placed;
+}
+
+/// Which of them are in front of the camera and no more than `margin` pixels outside the picture.
+HWY_INLINE hn::Mask<Floats> Inside(ScreenTransform const& transform, PlacedLanes const& placed, int width, int height,
+                                   int margin) {
+  Floats const d;
+  auto const low = hn::Set(d, -256.0F * static_cast<float>(margin));
+  auto const right = hn::Set(d, 256.0F * static_cast<float>(width + margin));
+  auto const bottom = hn::Set(d, 256.0F * static_cast<float>(height + margin));
+  auto inside = hn::And(hn::And(hn::Ge(placed.u, low), hn::Le(placed.u, right)),
+                        hn::And(hn::Ge(placed.v, low), hn::Le(placed.v, bottom)));
+  if (!transform.perspective) return inside;
+  return hn::And(inside, hn::Gt(placed.w, hn::Set(d, static_cast<float>(transform.near))));
+}
+
 void TransformVertices(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t begin,
                        std::size_t end, int width, int height, ScreenVertex* out) {
   Floats const d;
   Ints const di;
   std::size_t const lanes = hn::Lanes(d);
-  float m[ScreenTransform::kRows][4];
-  for (int r = 0; r < ScreenTransform::kRows; ++r) {
-    for (int c = 0; c < 4; ++c) m[r][c] = static_cast<float>(transform.rows[r][c]);
-  }
-  auto const one = hn::Set(d, 1.0F), subpixels = hn::Set(d, 256.0F);
-  auto const low = hn::Set(d, -256.0F * kGuardBand), near = hn::Set(d, static_cast<float>(transform.near));
-  auto const right = hn::Set(d, 256.0F * static_cast<float>(width + kGuardBand));
-  auto const bottom = hn::Set(d, 256.0F * static_cast<float>(height + kGuardBand));
+  auto const one = hn::Set(d, 1.0F);
   HWY_ALIGN float value[ScreenVertex::kValues][8];
   HWY_ALIGN std::int32_t x[8], y[8];
   for (std::size_t i = begin; i < end; i += lanes) {
     auto const px = hn::LoadU(d, &vertices.x[i]), py = hn::LoadU(d, &vertices.y[i]), pz = hn::LoadU(d, &vertices.z[i]);
-    auto const row = [&](int r) HWY_ATTR {
-      auto const a = hn::Add(hn::Mul(hn::Set(d, m[r][0]), px), hn::Mul(hn::Set(d, m[r][1]), py));
-      return hn::Add(hn::Add(a, hn::Mul(hn::Set(d, m[r][2]), pz)), hn::Set(d, m[r][3]));
-    };
-    auto const w = row(ScreenTransform::w);
-    auto const inverse = transform.perspective ? hn::Div(one, w) : one;
-    auto const u = hn::Mul(hn::Mul(row(ScreenTransform::u), inverse), subpixels);
-    auto const v = hn::Mul(hn::Mul(row(ScreenTransform::v), inverse), subpixels);
-    auto inside = hn::And(hn::And(hn::Ge(u, low), hn::Le(u, right)), hn::And(hn::Ge(v, low), hn::Le(v, bottom)));
-    if (transform.perspective) inside = hn::And(inside, hn::Gt(w, near));
-    auto const fixed_u = hn::NearestInt(hn::IfThenElseZero(inside, u));
+    auto const row = [&](int r) HWY_ATTR { return Row(transform, r, px, py, pz); };
+    auto const placed = Place(transform, px, py, pz);
+    auto const inside = Inside(transform, placed, width, height, kGuardBand);
+    auto const inverse = placed.inverse;
+    auto const fixed_u = hn::NearestInt(hn::IfThenElseZero(inside, placed.u));
     hn::Store(hn::IfThenElse(hn::RebindMask(di, inside), fixed_u, hn::Set(di, kBeyond)), di, x);
-    hn::Store(hn::NearestInt(hn::IfThenElseZero(inside, v)), di, y);
-    hn::Store(transform.perspective ? inverse : hn::Neg(row(ScreenTransform::depth)), d, value[ScreenVertex::key]);
+    hn::Store(hn::NearestInt(hn::IfThenElseZero(inside, placed.v)), di, y);
+    hn::Store(placed.key, d, value[ScreenVertex::key]);
     hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[ScreenVertex::s]);
     hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[ScreenVertex::t]);
     hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[ScreenVertex::w]);
@@ -166,6 +194,7 @@ class TextureWriter {
   static constexpr int kValues = kLit ? ScreenVertex::kValues : ScreenVertex::red;
   explicit TextureWriter(TextureTarget const& target) : target_(target) {}
   float* keys() const { return target_.key; }
+  int stride() const { return kTileStride; }
   bool wants_edges() const { return target_.wireframe; }
 
   template <class M, class V>
@@ -226,9 +255,10 @@ class TextureWriter {
 
 class IdWriter {
  public:
-  static constexpr int kValues = ScreenVertex::s;
+  static constexpr int kValues = 1;  // the key
   explicit IdWriter(IdTarget const& target) : target_(target) {}
   float* keys() const { return target_.key; }
+  int stride() const { return target_.stride; }
   bool wants_edges() const { return false; }
 
   template <class M, class V>
@@ -244,14 +274,12 @@ class IdWriter {
   IdTarget target_;
 };
 
-template <class Writer>
-HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& area, Writer const& writer) {
+template <class Vertex, class Writer>
+HWY_INLINE void DrawTriangle(Vertex const& a, Vertex const& b, Vertex const& c, std::uint32_t label,
+                             TileArea const& area, Writer const& writer) {
   Floats const d;
   Ints const di;
   int const lanes = static_cast<int>(hn::Lanes(d));
-  ScreenVertex const& a = *triangle.corners[0];
-  ScreenVertex const& b = *triangle.corners[1];
-  ScreenVertex const& c = *triangle.corners[2];
 
   // Pixel centres inside the bounding box, inside the tile.
   int const left = std::max((std::min({a.x, b.x, c.x}) + 255) >> 8, area.left);
@@ -263,10 +291,10 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
   // Edge functions E = A x + B y + C, at least 0 inside; in units of 256 subpixels at pixel centres, where the rest of
   // C is rounded down: that changes no sign. Top and left edges own their points.
   int step_x[3], step_y[3], start[3];
-  ScreenVertex const* const corners[] = {&a, &b, &c};
+  Vertex const* const corners[] = {&a, &b, &c};
   for (int k = 0; k < 3; ++k) {
-    ScreenVertex const& from = *corners[k];
-    ScreenVertex const& to = *corners[k == 2 ? 0 : k + 1];
+    Vertex const& from = *corners[k];
+    Vertex const& to = *corners[k == 2 ? 0 : k + 1];
     int const ex = from.y - to.y, ey = to.x - from.x;
     bool const owns = ex > 0 || (ex == 0 && ey > 0);
     std::int64_t const constant = -(std::int64_t{ex} * from.x + std::int64_t{ey} * from.y) - (owns ? 0 : 1);
@@ -318,7 +346,7 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
     float base[Writer::kValues];
     for (int k = 0; k < values; ++k) base[k] = at_left[k] + slopes.y[k] * (static_cast<float>(y) - a_y);
     auto lane = hn::Iota(d, 0);  // pixels from `left`: exact, so that sums do not depend on the vector's width
-    std::size_t at = static_cast<std::size_t>((y - area.top) * kTileStride + (left - area.left));
+    std::size_t at = static_cast<std::size_t>((y - area.top) * writer.stride() + (left - area.left));
     for (int x = left; x <= right; x += lanes) {
       auto const covered = hn::Gt(hn::Or(hn::Or(e0, e1), e2), hn::Set(di, -1));
       if (!hn::AllFalse(di, covered)) {
@@ -332,7 +360,7 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
                                       HWY_ATTR { return hn::Mul(hn::ConvertTo(d, e), hn::Set(d, edge_scale[k])); };
             on_edge = hn::Lt(hn::Min(hn::Min(distance(e0, 0), distance(e1, 1)), distance(e2, 2)), hn::Set(d, 0.6F));
           }
-          writer.Write(at, mask, key, base, lane, slopes, triangle.label, on_edge);
+          writer.Write(at, mask, key, base, lane, slopes, label, on_edge);
         }
       }
       e0 = hn::Add(e0, hn::Set(di, step_x[0] * lanes));
@@ -344,20 +372,137 @@ HWY_INLINE void DrawTriangle(ScreenTriangle const& triangle, TileArea const& are
   }
 }
 
+template <class Writer>
+HWY_INLINE void DrawTriangles(ScreenTriangle const* triangles, std::size_t count, TileArea const& area,
+                              Writer const& writer) {
+  for (std::size_t i = 0; i < count; ++i) {
+    ScreenTriangle const& t = triangles[i];
+    DrawTriangle(*t.corners[0], *t.corners[1], *t.corners[2], t.label, area, writer);
+  }
+}
+
 void DrawTextured(ScreenTriangle const* triangles, std::size_t count, TileArea const& area,
                   TextureTarget const& target) {
   if (target.lit) {
-    TextureWriter<true> const writer(target);
-    for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+    DrawTriangles(triangles, count, area, TextureWriter<true>(target));
   } else {
-    TextureWriter<false> const writer(target);
-    for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+    DrawTriangles(triangles, count, area, TextureWriter<false>(target));
   }
 }
 
 void DrawIds(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target) {
+  DrawTriangles(triangles, count, area, IdWriter(target));
+}
+
+bool PlaceVertices(VertexArrays const& vertices, ScreenTransform const& transform, int width, int height,
+                   PlacedVertex* out) {
+  Floats const d;
+  Ints const di;
+  std::size_t const lanes = hn::Lanes(d);
+  HWY_ALIGN float key[8];
+  HWY_ALIGN std::int32_t x[8], y[8];
+  for (std::size_t i = 0; i < vertices.count; i += lanes) {
+    auto const placed =
+        Place(transform, hn::LoadU(d, &vertices.x[i]), hn::LoadU(d, &vertices.y[i]), hn::LoadU(d, &vertices.z[i]));
+    std::size_t const count = std::min(lanes, vertices.count - i);
+    auto const inside = Inside(transform, placed, width, height, kIdMargin);
+    if (!hn::AllTrue(d, hn::Or(inside, hn::Not(hn::FirstN(d, count))))) return false;
+    hn::Store(hn::NearestInt(placed.u), di, x);
+    hn::Store(hn::NearestInt(placed.v), di, y);
+    hn::Store(placed.key, d, key);
+    for (std::size_t k = 0; k < count; ++k) out[i + k] = {x[k], y[k], {key[k]}};
+  }
+  return true;
+}
+
+/// DrawTriangle of one no wider than a vector, whose edge functions fit 32 bits when counted from its first pixel.
+HWY_INLINE void DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, PlacedVertex const& c, std::uint32_t label,
+                            std::int32_t area2, int left, int top, int bottom, IdTarget const& target) {
+  Floats const d;
+  Ints const di;
+  Words const du;
+  PlacedVertex const* const corners[] = {&a, &b, &c};
+  std::int32_t step_x[3], step_y[3], start[3];
+  for (int k = 0; k < 3; ++k) {
+    PlacedVertex const& from = *corners[k];
+    PlacedVertex const& to = *corners[k == 2 ? 0 : k + 1];
+    std::int32_t const ex = from.y - to.y, ey = to.x - from.x;
+    bool const owns = ex > 0 || (ex == 0 && ey > 0);
+    step_x[k] = 256 * ex;
+    step_y[k] = 256 * ey;
+    start[k] = ex * (256 * left - from.x) + ey * (256 * top - from.y) - (owns ? 0 : 1);
+  }
+  float const at_a = a.values[0], d1 = b.values[0] - at_a, d2 = c.values[0] - at_a;
+  float const dx1 = static_cast<float>(b.x - a.x), dy1 = static_cast<float>(b.y - a.y);
+  float const dx2 = static_cast<float>(c.x - a.x), dy2 = static_cast<float>(c.y - a.y);
+  float const scale = 256.0F / static_cast<float>(area2);
+  float const slope_x = (d1 * dy2 - d2 * dy1) * scale, slope_y = (d2 * dx1 - d1 * dx2) * scale;
+  float const at_left = at_a + slope_x * (static_cast<float>(left) - static_cast<float>(a.x) / 256);
+  float const a_y = static_cast<float>(a.y) / 256;
+  float const least = std::min(std::min(at_a, b.values[0]), c.values[0]);
+  float const most = std::max(std::max(at_a, b.values[0]), c.values[0]);
+
+  auto const iota = hn::Iota(di, 0);
+  auto e0 = hn::Add(hn::Set(di, start[0]), hn::Mul(hn::Set(di, step_x[0]), iota));
+  auto e1 = hn::Add(hn::Set(di, start[1]), hn::Mul(hn::Set(di, step_x[1]), iota));
+  auto e2 = hn::Add(hn::Set(di, start[2]), hn::Mul(hn::Set(di, step_x[2]), iota));
+  auto const along = hn::Mul(hn::Set(d, slope_x), hn::Iota(d, 0));
+  std::size_t at =
+      static_cast<std::size_t>(top) * static_cast<std::size_t>(target.stride) + static_cast<std::size_t>(left);
+  for (int y = top; y <= bottom; ++y) {
+    auto const plane = hn::Add(hn::Set(d, at_left + slope_y * (static_cast<float>(y) - a_y)), along);
+    auto const key = hn::Min(hn::Max(plane, hn::Set(d, least)), hn::Set(d, most));
+    auto const covered = hn::Gt(hn::Or(hn::Or(e0, e1), e2), hn::Set(di, -1));
+    auto const before = hn::LoadU(d, target.key + at);
+    auto const mask = hn::And(hn::RebindMask(d, covered), hn::Gt(key, before));
+    if (!hn::AllFalse(d, mask)) {
+      hn::StoreU(hn::IfThenElse(mask, key, before), d, target.key + at);
+      hn::StoreU(hn::IfThenElse(hn::RebindMask(du, mask), hn::Set(du, label), hn::LoadU(du, target.id + at)), du,
+                 target.id + at);
+    }
+    e0 = hn::Add(e0, hn::Set(di, step_y[0]));
+    e1 = hn::Add(e1, hn::Set(di, step_y[1]));
+    e2 = hn::Add(e2, hn::Set(di, step_y[2]));
+    at += static_cast<std::size_t>(target.stride);
+  }
+}
+
+template <bool kListed>
+HWY_INLINE void DrawMesh(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+                         std::size_t count, TileArea const& area, IdTarget const& target) {
+  Floats const d;
+  int const lanes = static_cast<int>(hn::Lanes(d));
   IdWriter const writer(target);
-  for (std::size_t i = 0; i < count; ++i) DrawTriangle(triangles[i], area, writer);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t const triangle = kListed ? list[i] : static_cast<std::uint32_t>(i);
+    PlacedVertex const& a = vertices[corners[3 * std::size_t{triangle}]];
+    PlacedVertex const* b = &vertices[corners[3 * std::size_t{triangle} + 1]];
+    PlacedVertex const* c = &vertices[corners[3 * std::size_t{triangle} + 2]];
+    // Half of a closed mesh turns its back, and of a fine one most triangles cover no pixel's centre.
+    std::int64_t const area2 = std::int64_t{b->x - a.x} * (c->y - a.y) - std::int64_t{b->y - a.y} * (c->x - a.x);
+    if (kListed ? area2 == 0 : area2 >= 0) continue;
+    int const left = (std::min(std::min(a.x, b->x), c->x) + 255) >> 8, right = std::max(std::max(a.x, b->x), c->x) >> 8;
+    int const top = (std::min(std::min(a.y, b->y), c->y) + 255) >> 8, bottom = std::max(std::max(a.y, b->y), c->y) >> 8;
+    if (left > right || top > bottom) continue;
+    if (area2 < 0) std::swap(b, c);
+    if (right - left < lanes && bottom - top < 64 && left >= area.left && right < area.right && top >= area.top &&
+        bottom < area.bottom) {
+      DrawSmallId(a, *b, *c, triangle, static_cast<std::int32_t>(area2 < 0 ? -area2 : area2), left, top, bottom,
+                  target);
+    } else {
+      DrawTriangle(a, *b, *c, triangle, area, writer);
+    }
+  }
+}
+
+void DrawMeshFronts(PlacedVertex const* vertices, std::int32_t const* corners, std::size_t count, TileArea const& area,
+                    IdTarget const& target) {
+  DrawMesh<false>(vertices, corners, nullptr, count, area, target);
+}
+
+void DrawMeshIds(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+                 std::size_t count, TileArea const& area, IdTarget const& target) {
+  DrawMesh<true>(vertices, corners, list, count, area, target);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -370,6 +515,9 @@ namespace scanview {
 HWY_EXPORT(TransformVertices);
 HWY_EXPORT(DrawTextured);
 HWY_EXPORT(DrawIds);
+HWY_EXPORT(PlaceVertices);
+HWY_EXPORT(DrawMeshFronts);
+HWY_EXPORT(DrawMeshIds);
 
 void transform_vertices(VertexArrays const& vertices, ScreenTransform const& transform, std::size_t begin,
                         std::size_t end, int width, int height, ScreenVertex* out) {
@@ -383,6 +531,21 @@ void draw_textured(ScreenTriangle const* triangles, std::size_t count, TileArea 
 
 void draw_ids(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target) {
   HWY_DYNAMIC_DISPATCH(DrawIds)(triangles, count, area, target);
+}
+
+bool place_vertices(VertexArrays const& vertices, ScreenTransform const& transform, int width, int height,
+                    PlacedVertex* out) {
+  return HWY_DYNAMIC_DISPATCH(PlaceVertices)(vertices, transform, width, height, out);
+}
+
+void draw_mesh_fronts(PlacedVertex const* vertices, std::int32_t const* corners, std::size_t count,
+                      TileArea const& area, IdTarget const& target) {
+  HWY_DYNAMIC_DISPATCH(DrawMeshFronts)(vertices, corners, count, area, target);
+}
+
+void draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+                   std::size_t count, TileArea const& area, IdTarget const& target) {
+  HWY_DYNAMIC_DISPATCH(DrawMeshIds)(vertices, corners, list, count, area, target);
 }
 
 std::vector<char const*> kernel_targets() {

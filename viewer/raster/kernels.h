@@ -16,6 +16,18 @@ void draw_textured(ScreenTriangle const* triangles, std::size_t count, TileArea 
                    TextureTarget const& target);
 void draw_ids(ScreenTriangle const* triangles, std::size_t count, TileArea const& area, IdTarget const& target);
 
+/// All vertices of a mesh for draw_mesh_ids(), in a picture of at most kIdPicture pixels a side. False, and nothing of
+/// use in `out`, where one is behind the near plane or more than kIdMargin pixels outside: then TriangleBins clip.
+bool place_vertices(VertexArrays const& vertices, ScreenTransform const& transform, int width, int height,
+                    PlacedVertex* out);
+/// Draws the triangles of a mesh that turn their front to the camera, without tiles, each under its number; the same
+/// pixels as draw_ids(). For pictures that are drawn side by side, of many small triangles.
+void draw_mesh_fronts(PlacedVertex const* vertices, std::int32_t const* corners, std::size_t count,
+                      TileArea const& area, IdTarget const& target);
+/// The same for the listed triangles, whichever side they turn.
+void draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+                   std::size_t count, TileArea const& area, IdTarget const& target);
+
 /// A layer of a tile for the compositor.
 struct ComposedLayer {
   TextureTarget samples;

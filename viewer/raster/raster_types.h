@@ -20,6 +20,15 @@ struct ScreenVertex {
 };
 inline constexpr std::int32_t kBeyond = INT32_MIN;
 
+/// A vertex of a picture that is drawn whole (draw_mesh_ids); fields as in ScreenVertex.
+struct PlacedVertex {
+  std::int32_t x, y;
+  float values[1];
+};
+/// Such a picture's longest side in pixels, and how far outside of it vertices may lie: edge functions fit 32 bits,
+/// 2 · 256 (kIdPicture + 2 kIdMargin) (kIdPicture + kIdMargin) < 2^31.
+inline constexpr int kIdPicture = 1024, kIdMargin = 128;
+
 /// Rows of the map from source coordinates (x, y, z, 1): position on the screen u w, v w, w (pixels, centre of pixel
 /// (0, 0) at 0), homogeneous texture coordinates s w', t w', w' (texels), and the point in the camera's coordinates, of
 /// which depth is z.
@@ -78,6 +87,7 @@ struct TextureTarget {
 struct IdTarget {
   float* key;
   std::uint32_t* id;
+  int stride = kTileStride;
 };
 
 /// A view's picture as the compositor samples it. Texels hold the square roots of linear light in 10 bits a channel

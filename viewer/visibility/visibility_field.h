@@ -1,0 +1,102 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/context.h"
+#include "mesh/polygon_model.h"
+#include "viewer/visibility/bit_rows.h"
+#include "viewer/visibility/patch_tree.h"
+#include "viewer/visibility/sample_sphere.h"
+#include "viewer/visibility/triangle_sampler.h"
+
+namespace scanview {
+
+/// `id`: a bit a polygon (Meruvia 2001); `patch`: a bit a patch of polygons (Meruvia 2002).
+enum class VisibilityMethod { id, patch };
+
+/// Eyes anywhere around the model: samples on shells of directions. A row for each shell's each direction.
+struct SphereLookup {
+  SampleSphere sphere = SampleSphere::octahedron(0);
+  /// Distances from the centre in radii, ascending; infinity: orthographic. Eyes nearer than the first see everything.
+  std::vector<double> shells;
+  /// OR the three samples around the eye, or also the three opposite to their edges (Meruvia 2001, section 3.2.1).
+  bool opposite = false;
+  /// A row for each face between each two shells instead (conservative mode).
+  bool rows_are_cells = false;
+};
+/// A recorded path: a row for each stretch of it.
+struct PathLookup {
+  std::vector<Eigen::Vector3d> eyes;  ///< of the frames
+  std::size_t stretch = 1;            ///< frames a row
+};
+/// A grid of cells inside a box: a row for each, x fastest. An eye sees what its cell and its neighbours see.
+struct GridLookup {
+  Eigen::AlignedBox3d box;
+  Eigen::Vector3i cells = {1, 1, 1};
+};
+
+/// Which patches of a model an eye can see.
+struct VisibilityField {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the ball around the model
+  double radius = 0;
+  Patches patches;  ///< triangles in the order in which they are drawn
+  BitRows rows;     ///< columns 2 p and 2 p + 1: whether the fronts and the backs of patch p's triangles are seen
+  std::variant<SphereLookup, PathLookup, GridLookup> lookup;
+  std::string model_hash;  ///< of the model it was made for (model_hash())
+  VisibilityMethod method = VisibilityMethod::patch;
+  std::size_t patches_asked = 0;
+
+  /// The rows to OR for an eye; none: everything is drawn. At most 64 of them.
+  struct Query {
+    std::size_t rows[64];
+    std::size_t count = 0;
+    int tests = 0;         ///< to find the face (SampleSphere::Location)
+    std::size_t cell = 0;  ///< equal cells have equal rows
+  };
+  Query query(Eigen::Vector3d const& eye) const;
+};
+
+struct VisibilityOptions {
+  VisibilityMethod method = VisibilityMethod::patch;
+  std::size_t samples = 1026;  ///< directions: 6, 18, 66, 258, 1026, 4098
+  /// A person's cameras instead; their directions make the sphere, their own distances the near shell.
+  std::vector<SampleCamera> cameras;
+  std::size_t patches = 0;  ///< 0: one for every 32 polygons
+  /// Distances of the samples in radii of the model, ascending; infinity: orthographic.
+  std::vector<double> shells = default_shells();
+  int resolution = 512;  ///< of a sample's picture
+  /// Triangles count as seen that an eye off the sample would see (TriangleSampler), as far off as this share of half
+  /// the distance to the next sample. 0 leaves only the smaller than a pixel.
+  double widening = 0.15;
+  Seen seen = Seen::nearly;  ///< in the papers: in_picture
+  /// After each sample, neighbours of seen polygons that face the camera count as seen too, so many times (Meruvia
+  /// 2001, section 3.1.1); −1: as long as there are any.
+  int fill = 0;
+  bool opposite = false;  ///< SphereLookup; always with `id`
+
+  static std::vector<double> default_shells();
+  /// Throws Error{usage} that names the field.
+  void validate() const;
+};
+
+/// How the time went, in seconds of all threads' wall clock.
+struct VisibilityTimes {
+  double patches = 0, sampling = 0;
+  std::size_t pictures = 0;
+};
+
+/// Samples a model. Transparent polygons hide nothing and belong to one last patch that is always seen. Warns where
+/// cameras leave directions uncovered. Throws Error{usage} for bad options and for a model without extent.
+VisibilityField build_visibility(PolygonModel const& model, VisibilityOptions const& options, Context& context,
+                                 VisibilityTimes* times = nullptr);
+
+/// Identifies positions and triangles of a model.
+std::string model_hash(TriangleMesh const& mesh);
+
+/// The model's triangles in the order of the field.
+TriangleMesh drawn_mesh(TriangleMesh const& mesh, Patches const& patches);
+
+}  // namespace scanview

@@ -1,0 +1,148 @@
+#include "viewer/visibility/visibility_selector.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "viewer/visibility/visibility_kernels.h"
+
+namespace scanview {
+namespace {
+
+void set_bits(std::vector<std::uint64_t>& bits, std::size_t begin, std::size_t end) {
+  std::size_t const first = begin / 64, last = end / 64;
+  std::uint64_t const from = ~std::uint64_t{0} << (begin % 64), until = ~(~std::uint64_t{0} << (end % 64));
+  if (first == last) {
+    bits[first] |= from & until;
+    return;
+  }
+  bits[first] |= from;
+  for (std::size_t w = first + 1; w < last; ++w) bits[w] = ~std::uint64_t{0};
+  if (until != 0) bits[last] |= until;
+}
+
+}  // namespace
+
+VisibilitySelector::VisibilitySelector(VisibilityField const& field, TriangleMesh const& drawn, bool facing)
+    : field_(&field),
+      facing_(facing),
+      planes_(drawn, field.center, field.radius),
+      drawn_(drawn.triangles.size() / 64 + 2) {
+  find_cones(field, drawn);
+}
+
+void VisibilitySelector::find_cones(VisibilityField const& field, TriangleMesh const& drawn) {
+  cones_.resize(field.patches.count());
+  for (std::size_t p = 0; p < cones_.size(); ++p) {
+    PatchCone& cone = cones_[p];
+    std::size_t const begin = field.patches.begins[p], end = field.patches.begins[p + 1];
+    Eigen::Vector3f axis = Eigen::Vector3f::Zero();
+    Eigen::AlignedBox3d box;
+    for (std::size_t i = begin; i < end; ++i) {
+      axis += Eigen::Vector3f(planes_.x[i], planes_.y[i], planes_.z[i]);
+      for (int k = 0; k < 3; ++k)
+        box.extend(drawn.vertices[static_cast<std::size_t>(drawn.triangles[i][k])].cast<double>());
+    }
+    if (!(axis.norm() > 0)) continue;
+    axis.normalize();
+    float least = 1;
+    for (std::size_t i = begin; i < end; ++i)
+      least = std::min(least, axis.dot(Eigen::Vector3f(planes_.x[i], planes_.y[i], planes_.z[i])));
+    if (least <= 0) continue;
+    Eigen::Vector3f const middle = ((box.center() - field.center) / field.radius).cast<float>();
+    float const radius = static_cast<float>(0.5 * box.diagonal().norm() / field.radius);
+    cone = {axis.x(),   axis.y(),   axis.z(),   least,  std::sqrt(std::max(0.0F, 1 - least * least)),
+            middle.x(), middle.y(), middle.z(), radius, false};
+  }
+}
+
+void VisibilitySelector::take_patch(std::size_t patch, bool front, bool back, EyePoint const& eye) {
+  std::size_t const begin = field_->patches.begins[patch], end = field_->patches.begins[patch + 1];
+  ++patches_;
+  if (!facing_ || (front && back)) {
+    set_bits(drawn_, begin, end);
+    return;
+  }
+  PatchCone const& cone = cones_[patch];
+  if (!cone.is_wide) {
+    // n · (eye − p) for all normals n of the cone and all points p of the ball: its bounds.
+    float const vx = eye.x - cone.cx * eye.w, vy = eye.y - cone.cy * eye.w, vz = eye.z - cone.cz * eye.w;
+    float const to_axis = vx * cone.x + vy * cone.y + vz * cone.z;
+    float const across = std::sqrt(std::max(0.0F, vx * vx + vy * vy + vz * vz - to_axis * to_axis));
+    float const along = front ? to_axis : -to_axis;
+    float const slack = cone.radius * eye.w + 1e-5F;
+    if (along * cone.cosine - across * cone.sine > slack) {
+      set_bits(drawn_, begin, end);
+      return;
+    }
+    if (along < 0 && along * cone.cosine + across * cone.sine < -slack) return;
+  }
+  facing_bits({planes_.x.data(), planes_.y.data(), planes_.z.data(), planes_.offset.data()},
+              {eye.x, eye.y, eye.z, eye.w}, front ? 1.0F : -1.0F, begin, end, drawn_.data());
+}
+
+void VisibilitySelector::collect_ranges() {
+  ranges_.clear();
+  triangles_ = 0;
+  std::uint64_t carried = 0;  // the bit before the word
+  std::uint32_t begin = 0;
+  for (std::size_t w = 0; w < drawn_.size(); ++w) {
+    std::uint64_t const bits = drawn_[w];
+    // Where runs begin and end.
+    for (std::uint64_t changes = bits ^ (bits << 1 | carried); changes != 0; changes &= changes - 1) {
+      auto const at = static_cast<std::uint32_t>(64 * w + static_cast<std::size_t>(std::countr_zero(changes)));
+      if ((bits >> (at % 64) & 1) != 0) {
+        begin = at;
+      } else {
+        ranges_.push_back({begin, at - begin});
+        triangles_ += at - begin;
+      }
+    }
+    carried = bits >> 63;
+  }
+}
+
+std::span<IndexRange const> VisibilitySelector::answer(VisibilityField::Query const& query, EyePoint const& eye) {
+  tests_ = query.tests;
+  patches_ = 0;
+  whole_ = query.count == 0;
+  if (whole_) {
+    patches_ = field_->patches.count();
+    triangles_ = field_->patches.triangles.size();
+    ranges_.assign(1, {0, static_cast<std::uint32_t>(triangles_)});
+    if (triangles_ == 0) ranges_.clear();
+    return ranges_;
+  }
+  if (!facing_ && query.cell < kept_.size() && !kept_[query.cell].empty()) {
+    triangles_ = 0;
+    for (IndexRange const& range : kept_[query.cell]) triangles_ += range.count;
+    return kept_[query.cell];
+  }
+  std::fill(drawn_.begin(), drawn_.end(), 0);
+  field_->rows.visit_union({query.rows, query.count}, [&](std::size_t word, std::uint64_t bits) {
+    while (bits != 0) {
+      auto const side = static_cast<std::size_t>(std::countr_zero(bits)) & ~std::size_t{1};
+      std::uint64_t const both = bits >> side & 3;
+      take_patch(32 * word + side / 2, (both & 1) != 0, (both & 2) != 0, eye);
+      bits &= ~(std::uint64_t{3} << side);
+    }
+  });
+  collect_ranges();
+  if (facing_) return ranges_;
+  if (kept_.size() <= query.cell) kept_.resize(query.cell + 1);
+  return kept_[query.cell] = ranges_;
+}
+
+std::span<IndexRange const> VisibilitySelector::select(Eigen::Vector3d const& eye) {
+  return answer(field_->query(eye), planes_.eye(eye));
+}
+
+std::span<IndexRange const> VisibilitySelector::select_from_afar(Eigen::Vector3d const& direction) {
+  Eigen::Vector3d const unit = direction.normalized();
+  Eigen::Vector3f const d = unit.cast<float>();
+  // Far beyond every finite shell.
+  return answer(field_->query(field_->center + 1e9 * field_->radius * unit), {d.x(), d.y(), d.z(), 0});
+}
+
+}  // namespace scanview
