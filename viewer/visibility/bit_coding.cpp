@@ -88,30 +88,39 @@ class Decoder {
   std::uint32_t code_ = 0, range_ = 0xffffffffU;
 };
 
+/// How a patch faces an eye, in sixteen steps.
+std::size_t facing(PatchPlace const& patch, Eigen::Vector4d const& eye) {
+  Eigen::Vector3d const to_eye = eye.head<3>() - eye.w() * patch.center;
+  double const length = to_eye.norm();
+  if (!(length > 0)) return 8;
+  return static_cast<std::size_t>(std::clamp(8 + 8 * patch.normal.dot(to_eye) / length, 0.0, 15.0));
+}
+
 /// Calls code(probability, row, column) for each bit, in the order of the file.
 template <typename Code>
-void for_each_bit(std::size_t rows, std::size_t columns, std::vector<RowNeighbors> const& neighbors, Code const& code) {
-  constexpr std::size_t kContexts = 2 * 4 * 4 * 3 * 4;
-  std::array<std::uint16_t, kContexts> probabilities;
-  probabilities.fill(1U << (kProbabilityBits - 1));
+void for_each_bit(std::vector<RowPlace> const& rows, std::vector<PatchPlace> const& patches, Code const& code) {
+  constexpr std::size_t kContexts = std::size_t{2} * 16 * 4 * 4 * 3 * 4;
+  std::vector<std::uint16_t> probabilities(kContexts, 1U << (kProbabilityBits - 1));
+  std::vector<std::uint8_t> faces(rows.size());
   // The bits of this column, and of the same side of the two patches before.
-  std::array<std::vector<std::uint8_t>, 5> columns_kept;
-  for (auto& kept : columns_kept) kept.assign(rows, 0);
-  for (std::size_t column = 0; column < columns; ++column) {
-    auto& now = columns_kept[column % 5];
-    auto const& before = columns_kept[(column + 3) % 5];
-    auto const& earlier = columns_kept[(column + 1) % 5];
-    for (std::size_t row = 0; row < rows; ++row) {
-      RowNeighbors const& near = neighbors[row];
+  std::array<std::vector<std::uint8_t>, 5> kept;
+  for (auto& column : kept) column.assign(rows.size(), 0);
+  for (std::size_t column = 0; column < 2 * patches.size(); ++column) {
+    auto& now = kept[column % 5];
+    auto const& before = kept[(column + 3) % 5];
+    auto const& earlier = kept[(column + 1) % 5];
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      RowPlace const& place = rows[row];
+      if (column % 2 == 0) faces[row] = static_cast<std::uint8_t>(facing(patches[column / 2], place.eye));
       auto const pair = [&](std::int32_t a, std::int32_t b) -> std::size_t {
         if (a < 0) return 3;
         std::size_t const first = now[static_cast<std::size_t>(a)];
         return first + (b < 0 ? first : now[static_cast<std::size_t>(b)]);
       };
-      std::size_t context = column % 2;
-      context = 4 * context + pair(near.beside[0], near.beside[1]);
-      context = 4 * context + pair(near.beside[2], near.beside[3]);
-      context = 3 * context + (near.twin < 0 ? 2 : now[static_cast<std::size_t>(near.twin)]);
+      std::size_t context = 16 * (column % 2) + faces[row];
+      context = 4 * context + pair(place.beside[0], place.beside[1]);
+      context = 4 * context + pair(place.beside[2], place.beside[3]);
+      context = 3 * context + (place.twin < 0 ? 2 : now[static_cast<std::size_t>(place.twin)]);
       context = 4 * context + (column >= 2 ? 2U * before[row] : 0U) + (column >= 4 ? earlier[row] : 0U);
       now[row] = code(probabilities[context], row, column) ? 1 : 0;
     }
@@ -120,25 +129,25 @@ void for_each_bit(std::size_t rows, std::size_t columns, std::vector<RowNeighbor
 
 }  // namespace
 
-std::string encode_bits(BitRows const& rows, std::vector<RowNeighbors> const& neighbors) {
+std::string encode_bits(BitRows const& bits, std::vector<RowPlace> const& rows,
+                        std::vector<PatchPlace> const& patches) {
   Encoder encoder;
-  for_each_bit(rows.rows(), rows.columns(), neighbors,
-               [&](std::uint16_t& probability, std::size_t row, std::size_t column) {
-                 bool const bit = rows.test(row, column);
-                 encoder.put(probability, bit);
-                 return bit;
-               });
+  for_each_bit(rows, patches, [&](std::uint16_t& probability, std::size_t row, std::size_t column) {
+    bool const bit = bits.test(row, column);
+    encoder.put(probability, bit);
+    return bit;
+  });
   return encoder.finish();
 }
 
-BitRows decode_bits(std::string_view bytes, std::size_t rows, std::size_t columns,
-                    std::vector<RowNeighbors> const& neighbors, std::filesystem::path const& path) {
+BitRows decode_bits(std::string_view bytes, std::vector<RowPlace> const& rows, std::vector<PatchPlace> const& patches,
+                    std::filesystem::path const& path) {
   std::size_t const most = kMostBitsAByte * (bytes.size() + 8);
-  if (rows > most || columns > most || (rows > 0 && columns > most / rows) || neighbors.size() != rows)
+  if (!patches.empty() && rows.size() > most / (2 * patches.size()))
     throw Error(ErrorCode::bad_input, path, "fewer bytes than its visibility bits need");
-  BitRows result(rows, columns);
+  BitRows result(rows.size(), 2 * patches.size());
   Decoder decoder(bytes);
-  for_each_bit(rows, columns, neighbors, [&](std::uint16_t& probability, std::size_t row, std::size_t column) {
+  for_each_bit(rows, patches, [&](std::uint16_t& probability, std::size_t row, std::size_t column) {
     bool const bit = decoder.get(probability);
     if (bit) result.set(row, column);
     return bit;

@@ -109,60 +109,99 @@ std::size_t lookup_from_json(Json const& json, VisibilityField& field) {
   return rows;
 }
 
-std::vector<RowNeighbors> row_neighbors(VisibilityField const& field, std::size_t rows) {
-  std::vector<RowNeighbors> neighbors(rows);
+std::vector<RowPlace> row_places(VisibilityField const& field, std::size_t rows) {
+  std::vector<RowPlace> places(rows);
   auto const index = [](std::size_t i) { return static_cast<std::int32_t>(i); };
-  if (auto const* sphere = std::get_if<SphereLookup>(&field.lookup)) {
-    std::size_t const a_shell =
-        sphere->rows_are_cells ? sphere->sphere.faces().size() : sphere->sphere.directions().size();
+  if (auto const* lookup = std::get_if<SphereLookup>(&field.lookup)) {
+    SampleSphere const& sphere = lookup->sphere;
+    bool const cells = lookup->rows_are_cells;
+    std::size_t const a_shell = cells ? sphere.faces().size() : sphere.directions().size();
     for (std::size_t row = 0; row < rows; ++row) {
-      std::size_t const first = row / a_shell * a_shell;
-      if (row >= a_shell) neighbors[row].twin = index(row - a_shell);
-      if (sphere->rows_are_cells) {
-        // Faces follow each other as they were cut: the last few lie beside it.
-        for (std::size_t k = 0; k < 4 && row - first > k; ++k) neighbors[row].beside[k] = index(row - k - 1);
-        continue;
-      }
+      std::size_t const at = row % a_shell, first = row - at;
+      if (row >= a_shell) places[row].twin = index(row - a_shell);
+      Eigen::Vector3d direction = Eigen::Vector3d::Zero();
       for (std::size_t k = 0; k < 4; ++k) {
-        int const other = sphere->sphere.between()[row - first][k];
-        if (other >= 0) neighbors[row].beside[k] = index(first + static_cast<std::size_t>(other));
+        // Faces follow each other as they were cut: the last few lie beside it.
+        std::int64_t const other = cells ? static_cast<std::int64_t>(at) - static_cast<std::int64_t>(k) - 1
+                                         : std::int64_t{sphere.between()[at][k]};
+        if (other >= 0) places[row].beside[k] = index(first + static_cast<std::size_t>(other));
       }
+      if (cells) {
+        for (int k = 0; k < 3; ++k) direction += sphere.directions()[static_cast<std::size_t>(sphere.faces()[at][k])];
+        direction.normalize();
+      } else {
+        direction = sphere.directions()[at];
+      }
+      double const distance = lookup->shells[row / a_shell];
+      places[row].eye << (std::isfinite(distance) ? distance : 1) * direction, std::isfinite(distance) ? 1 : 0;
     }
-  } else if (std::holds_alternative<PathLookup>(field.lookup)) {
-    for (std::size_t row = 1; row < rows; ++row) neighbors[row].beside[0] = index(row - 1);
+  } else if (auto const* path = std::get_if<PathLookup>(&field.lookup)) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      if (row > 0) places[row].beside[0] = index(row - 1);
+      places[row].eye << (path->eyes[row * path->stretch] - field.center) / field.radius, 1;
+    }
   } else {
     Eigen::Vector3i const cells = std::get<GridLookup>(field.lookup).cells;
     auto const across = static_cast<std::size_t>(cells.x()), layer = across * static_cast<std::size_t>(cells.y());
     for (std::size_t row = 0; row < rows; ++row) {
-      if (row % across > 0) neighbors[row].beside[0] = index(row - 1);
-      if (row % layer >= across) neighbors[row].beside[2] = index(row - across);
-      if (row >= layer) neighbors[row].twin = index(row - layer);
+      if (row % across > 0) places[row].beside[0] = index(row - 1);
+      if (row % layer >= across) places[row].beside[2] = index(row - across);
+      if (row >= layer) places[row].twin = index(row - layer);
     }
   }
-  return neighbors;
+  return places;
 }
 
-std::string format_visibility(VisibilityField const& field) {
+std::string hash_bits(BitRows const& rows) {
+  std::string hash;
+  for (std::size_t row = 0; row < rows.rows(); ++row) {
+    auto const words = rows.row(row);
+    hash = hash_bytes(hash + std::string(reinterpret_cast<char const*>(words.data()), words.size_bytes()));
+  }
+  return hash;
+}
+
+std::vector<PatchPlace> patch_places(VisibilityField const& field, TriangleMesh const& mesh) {
+  std::vector<PatchPlace> places(field.patches.count());
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    double corners = 0;
+    for (std::size_t i = field.patches.begins[p]; i < field.patches.begins[p + 1]; ++i) {
+      Eigen::Vector3i const& triangle = mesh.triangles[field.patches.triangles[i]];
+      auto const corner = [&](int k) -> Eigen::Vector3d {
+        auto const v = mesh.vertices[static_cast<std::size_t>(triangle[k])].cast<double>();
+        return (v - field.center) / field.radius;
+      };
+      places[p].normal += (corner(1) - corner(0)).cross(corner(2) - corner(0));
+      for (int k = 0; k < 3; ++k) places[p].center += corner(k);
+      corners += 3;
+    }
+    places[p].center /= std::max(corners, 1.0);
+    double const length = places[p].normal.norm();
+    if (length > 0) places[p].normal /= length;
+  }
+  return places;
+}
+
+}  // namespace
+
+std::string format_visibility(VisibilityField const& field, TriangleMesh const& mesh) {
   Json header{{"method", field.method == VisibilityMethod::id ? "id" : "patch"},
               {"patches_asked", field.patches_asked},
               {"patches", field.patches.count()},
               {"model", field.model_hash},
               {"center", to_json(field.center)},
               {"radius", field.radius},
+              {"bits", hash_bits(field.rows)},
               {"lookup", lookup_to_json(field)}};
   std::string bytes(kMagic);
   bytes += header.dump() + '\n';
-  bytes += encode_bits(field.rows, row_neighbors(field, field.rows.rows()));
+  bytes += encode_bits(field.rows, row_places(field, field.rows.rows()), patch_places(field, mesh));
   return bytes + hash_bytes(bytes);
 }
 
-}  // namespace
-
-void write_visibility(fs::path const& path, VisibilityField const& field) {
-  write_file(path, format_visibility(field));
+void write_visibility(fs::path const& path, VisibilityField const& field, TriangleMesh const& mesh) {
+  write_file(path, format_visibility(field, mesh));
 }
-
-std::size_t visibility_file_size(VisibilityField const& field) { return format_visibility(field).size(); }
 
 VisibilityField read_visibility(fs::path const& path, PolygonModel const& model) {
   return parse_visibility(read_file(path), model, path);
@@ -179,12 +218,14 @@ VisibilityField parse_visibility(std::string_view bytes, PolygonModel const& mod
   if (line == std::string_view::npos) fail("has no header");
   VisibilityField field;
   std::size_t rows = 0, patches = 0;
+  std::string bits_hash;
   try {
     Json const header = Json::parse(rest.substr(0, line));
     field.model_hash = header.at("model").get<std::string>();
     field.method = header.at("method").get<std::string>() == "id" ? VisibilityMethod::id : VisibilityMethod::patch;
     field.patches_asked = header.at("patches_asked").get<std::size_t>();
     patches = header.at("patches").get<std::size_t>();
+    bits_hash = header.at("bits").get<std::string>();
     field.center = vector_of(header.at("center"));
     field.radius = header.at("radius").get<double>();
     if (!(field.radius > 0)) throw std::runtime_error("a radius above 0");
@@ -195,7 +236,8 @@ VisibilityField parse_visibility(std::string_view bytes, PolygonModel const& mod
   if (field.model_hash != model_hash(model.mesh)) fail("was made for another model");
   field.patches = model_patches(model, field.method, field.patches_asked);
   if (field.patches.count() != patches) fail("was made with other patches of this model: build it again");
-  field.rows = decode_bits(rest.substr(line + 1), rows, 2 * patches, row_neighbors(field, rows), path);
+  field.rows = decode_bits(rest.substr(line + 1), row_places(field, rows), patch_places(field, model.mesh), path);
+  if (hash_bits(field.rows) != bits_hash) fail("its bits were coded by a version that computes differently");
   return field;
 }
 

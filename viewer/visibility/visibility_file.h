@@ -7,9 +7,9 @@ namespace scanview {
 
 /// Writes a .vis file: a line "scanview visibility 1", a line of JSON (method, patches, lookup, the model's hash), the
 /// coded bits (bit_coding.h) and their check sum. Patches are not in it: they follow from the model.
-void write_visibility(std::filesystem::path const& path, VisibilityField const& field);
-/// How many bytes that takes.
-std::size_t visibility_file_size(VisibilityField const& field);
+/// mesh: of the model.
+void write_visibility(std::filesystem::path const& path, VisibilityField const& field, TriangleMesh const& mesh);
+std::string format_visibility(VisibilityField const& field, TriangleMesh const& mesh);
 
 /// For the model it was made of. Throws Error{bad_input} that tells what is wrong: another model, another version of
 /// the patches, a damaged or cut off file.
