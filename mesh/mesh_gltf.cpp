@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <map>
 
 #include "mesh/byte_reader.h"
 #include "mesh/equal_vertices.h"
@@ -70,29 +71,15 @@ class GltfReader {
 
   PolygonModel read() {
     check_extensions();
-    struct Item {
-      std::size_t node;
-      Eigen::Affine3d parent;
-    };
-    std::vector<Item> stack;
-    std::vector<std::size_t> const roots = root_nodes();
-    for (auto root = roots.rbegin(); root != roots.rend(); ++root)
-      stack.push_back({*root, Eigen::Affine3d::Identity()});
-    std::vector<bool> seen(list("nodes").size(), false);
-    while (!stack.empty()) {
-      Item const item = stack.back();
-      stack.pop_back();
-      Json const& node = gltf_.at("nodes").at(item.node);
-      if (seen[item.node]) builder_.fail(fmt::format("node {} has two parents", item.node));
-      seen[item.node] = true;
-      Eigen::Affine3d const scene_from_node = item.parent * parent_from_node(node);
-      if (std::size_t const mesh = gltf_size(node, "mesh", kNone, path_); mesh != kNone) {
-        add_mesh(gltf_.at("meshes").at(mesh), scene_from_node);
-        is_posed_ = is_posed_ || node.contains("skin");
-      }
-      std::vector<std::size_t> const children = indices_of(node, "children");
-      for (auto child = children.rbegin(); child != children.rend(); ++child)
-        stack.push_back({*child, scene_from_node});
+    std::vector<Instance> const instances = placed_meshes();
+    std::map<std::size_t, std::size_t> left;  // of each mesh
+    for (Instance const& instance : instances) ++left[instance.mesh];
+    for (Instance const& instance : instances) {
+      std::size_t const triangles = builder_.triangle_count(), vertices = builder_.vertex_count();
+      add_mesh(gltf_.at("meshes").at(instance.mesh), instance.scene_from_node);
+      std::size_t const count = left[instance.mesh]--;
+      check_most(triangles + count * (builder_.triangle_count() - triangles));
+      check_most(vertices + count * (builder_.vertex_count() - vertices));
     }
     if (left_out_ > 0) builder_.note(fmt::format("{} primitives of points or lines were left out", left_out_));
     if (is_posed_) builder_.note("skins and morph targets were left in the pose they were modelled in");
@@ -100,6 +87,39 @@ class GltfReader {
   }
 
  private:
+  struct Instance {
+    std::size_t mesh;
+    Eigen::Affine3d scene_from_node;
+  };
+
+  std::vector<Instance> placed_meshes() {
+    struct Item {
+      std::size_t node;
+      Eigen::Affine3d scene_from_parent;
+    };
+    std::vector<Instance> instances;
+    std::vector<Item> stack;
+    auto const push = [&stack](std::vector<std::size_t> const& nodes, Eigen::Affine3d const& scene_from_parent) {
+      for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) stack.push_back({*node, scene_from_parent});
+    };
+    push(root_nodes(), Eigen::Affine3d::Identity());
+    std::vector<bool> seen(list("nodes").size(), false);
+    while (!stack.empty()) {
+      Item const item = stack.back();
+      stack.pop_back();
+      Json const& node = gltf_.at("nodes").at(item.node);
+      if (seen[item.node]) builder_.fail(fmt::format("node {} has two parents", item.node));
+      seen[item.node] = true;
+      Eigen::Affine3d const scene_from_node = item.scene_from_parent * parent_from_node(node);
+      if (std::size_t const mesh = gltf_size(node, "mesh", kNone, path_); mesh != kNone) {
+        instances.push_back({mesh, scene_from_node});
+        is_posed_ = is_posed_ || node.contains("skin");
+      }
+      push(indices_of(node, "children"), scene_from_node);
+    }
+    return instances;
+  }
+
   Json const& list(char const* key) const {
     static Json const kEmpty = Json::array();
     auto const found = gltf_.find(key);
@@ -202,7 +222,7 @@ class GltfReader {
   }
 
   void check_most(std::size_t count) const {
-    if (count > kMost) builder_.fail("holds, with all instances, more than 2^25 triangles");
+    if (count > kMost) builder_.fail("holds, with all instances, more than 2^25 triangles or vertices");
   }
 
   Json const& gltf_;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 
+#include "mesh/polygon_model.h"
 #include "mesh/texture_split.h"
 #include "mesh/view_mesh.h"
 #include "tests/mesh/depth_maps.h"
@@ -71,6 +72,22 @@ TEST(Glb, IsReadByAnotherProgramWithPosesAxesAndUnit) {
   EXPECT_EQ(model.images.size(), 2u);
   EXPECT_EQ(model.extensionsUsed, std::vector<std::string>{"KHR_materials_unlit"});
   EXPECT_EQ(load(TwoViews(Unit::m).glb()).nodes[0].matrix[0], 1.0);
+}
+
+TEST(Glb, IsReadByOurOwnReader) {
+  TwoViews const two;
+  TriangleMesh const mesh = parse_polygon_model(two.glb(), "two.glb").mesh;
+  std::size_t triangles = 0;
+  for (auto const& accessor : load(two.glb()).accessors)
+    if (accessor.type == TINYGLTF_TYPE_SCALAR && accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+      triangles += accessor.count / 3;
+  EXPECT_EQ(mesh.triangles.size(), triangles);
+  // Millimetres to metres, y and z turned round.
+  Eigen::Vector3d const p = *two.set.views[0].object_from_camera * two.meshes[0].mesh.vertices[0].cast<double>();
+  Eigen::Vector3f const placed = (Eigen::Vector3d(p.x(), -p.y(), -p.z()) / 1000).cast<float>();
+  float nearest = 1;
+  for (Eigen::Vector3f const& vertex : mesh.vertices) nearest = std::min(nearest, (vertex - placed).norm());
+  EXPECT_LT(nearest, 1e-8f);
 }
 
 TEST(Glb, AccessorsAreAlignedAndTheirLimitsHold) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include "base/files.h"
 #include "mesh/polygon_model.h"
 #include "tests/expect_error.h"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "mesh/polygon_model.h"
 
@@ -96,7 +97,9 @@ TEST_P(PolygonModels, AreReadAndTurnedOutwards) {
   EXPECT_EQ(model.mesh.triangles.size(), GetParam().triangles);
   EXPECT_EQ(model.polygon_count(), GetParam().triangles);
   EXPECT_FALSE(is_wound_inwards(model.mesh));
-  EXPECT_EQ(is_wound_inwards(read_triangle_mesh(path)), GetParam().inwards);
+  std::vector<std::string> const& notes = model.notes;
+  EXPECT_EQ(std::any_of(notes.begin(), notes.end(), [](auto const& note) { return note.starts_with("wound inwards"); }),
+            GetParam().inwards);
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, PolygonModels,
