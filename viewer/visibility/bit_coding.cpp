@@ -129,6 +129,33 @@ void for_each_bit(std::vector<RowPlace> const& rows, std::vector<PatchPlace> con
 
 }  // namespace
 
+std::string encode_flags(std::vector<bool> const& flags) {
+  Encoder encoder;
+  std::array<std::uint16_t, 4> probabilities;
+  probabilities.fill(1U << (kProbabilityBits - 1));
+  std::size_t context = 0;
+  for (bool const flag : flags) {
+    encoder.put(probabilities[context], flag);
+    context = (2 * context + (flag ? 1 : 0)) % 4;
+  }
+  return encoder.finish();
+}
+
+std::vector<bool> decode_flags(std::string_view bytes, std::size_t count, std::filesystem::path const& path) {
+  if (count > kMostBitsAByte * (bytes.size() + 8))
+    throw Error(ErrorCode::bad_input, path, "fewer bytes than its patches need");
+  Decoder decoder(bytes);
+  std::array<std::uint16_t, 4> probabilities;
+  probabilities.fill(1U << (kProbabilityBits - 1));
+  std::vector<bool> flags(count);
+  std::size_t context = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    flags[i] = decoder.get(probabilities[context]);
+    context = (2 * context + (flags[i] ? 1 : 0)) % 4;
+  }
+  return flags;
+}
+
 std::string encode_bits(BitRows const& bits, std::vector<RowPlace> const& rows,
                         std::vector<PatchPlace> const& patches) {
   Encoder encoder;

@@ -21,6 +21,10 @@ struct PatchPlace {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero(), center = Eigen::Vector3d::Zero();
 };
 
+/// Any bits in a row, as their context the two before; where they are mostly equal they cost little.
+std::string encode_flags(std::vector<bool> const& flags);
+std::vector<bool> decode_flags(std::string_view bytes, std::size_t count, std::filesystem::path const& path);
+
 /// Bits as an adaptive binary range coder keeps them (Martin 1979; probabilities of 12 bits as in LZMA). A bit's
 /// context is how its patch faces the row's eye, what the rows nearby have in its column, and what the row has in the
 /// two patches before, which lie beside it on the model: visibility changes along lines, on the sphere as on the

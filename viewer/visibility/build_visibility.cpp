@@ -5,15 +5,20 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string_view>
 
 #include "base/error.h"
 #include "base/files.h"
+#include "viewer/visibility/patch_choice.h"
 #include "viewer/visibility/sampled_rows.h"
 #include "viewer/visibility/visibility_field.h"
 
 namespace scanview {
 namespace {
+
+/// Adaptive patches are made of patches of so many polygons; of large models of more, to stay within memory.
+constexpr std::size_t kFinePolygons = 4, kMostFinePatches = 1 << 17;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -77,33 +82,44 @@ TriangleMesh drawn_mesh(TriangleMesh const& mesh, Patches const& patches) {
   return drawn;
 }
 
-Patches model_patches(PolygonModel const& model, VisibilityMethod method, std::size_t count) {
-  if (model.transparent.empty()) {
-    PatchTree const tree(model.mesh, model.polygons);
-    return tree.cut(method == VisibilityMethod::id ? tree.polygon_count() : count);
-  }
+Patches coarser_patches(Patches fine, std::vector<std::uint32_t> const& begins) {
+  std::vector<std::uint32_t> triangles;
+  for (std::uint32_t const begin : begins) triangles.push_back(fine.begins[begin]);
+  fine.begins = std::move(triangles);
+  return fine;
+}
+
+PatchHierarchy model_patches(PolygonModel const& model, VisibilityMethod method, std::size_t count) {
   TriangleMesh opaque;
   std::vector<std::int32_t> polygons;
-  std::vector<std::uint32_t> from;
+  std::vector<std::uint32_t> from, transparent;
+  opaque.vertices = model.mesh.vertices;
   for (std::size_t i = 0; i < model.mesh.triangles.size(); ++i) {
-    if (model.transparent[i] != 0) continue;
+    if (!model.transparent.empty() && model.transparent[i] != 0) {
+      transparent.push_back(static_cast<std::uint32_t>(i));
+      continue;
+    }
+    auto const polygon_of = [&](std::size_t t) {
+      return model.polygons.empty() ? static_cast<std::int32_t>(t) : model.polygons[t];
+    };
+    bool const same = !from.empty() && polygon_of(from.back()) == polygon_of(i);
+    polygons.push_back(polygons.empty() ? 0 : polygons.back() + (same ? 0 : 1));
     from.push_back(static_cast<std::uint32_t>(i));
     opaque.triangles.push_back(model.mesh.triangles[i]);
-    std::int32_t const polygon = model.polygons.empty() ? static_cast<std::int32_t>(i) : model.polygons[i];
-    bool const same = from.size() > 1 && !model.polygons.empty() && model.polygons[from[from.size() - 2]] == polygon;
-    polygons.push_back(polygons.empty() ? 0 : polygons.back() + (same ? 0 : 1));
   }
-  opaque.vertices = model.mesh.vertices;
   PatchTree const tree(opaque, polygons);
-  Patches patches = tree.cut(method == VisibilityMethod::id ? tree.polygon_count() : count);
+  PatchHierarchy hierarchy = tree.hierarchy(method == VisibilityMethod::id ? tree.polygon_count() : count);
+  if (transparent.empty()) return hierarchy;
+  Patches& patches = hierarchy.fine;
+  auto const opaque_count = static_cast<std::uint32_t>(patches.count());
   for (auto& triangle : patches.triangles) triangle = from[triangle];
-  std::size_t const opaque_count = patches.triangles.size();
-  for (std::size_t i = 0; i < model.transparent.size(); ++i) {
-    if (model.transparent[i] != 0) patches.triangles.push_back(static_cast<std::uint32_t>(i));
+  patches.triangles.insert(patches.triangles.end(), transparent.begin(), transparent.end());
+  patches.begins.push_back(static_cast<std::uint32_t>(patches.triangles.size()));
+  for (auto& fusion : hierarchy.fusions) {
+    if (fusion.first >= opaque_count) ++fusion.first;
+    if (fusion.second >= opaque_count) ++fusion.second;
   }
-  if (patches.triangles.size() > opaque_count)
-    patches.begins.push_back(static_cast<std::uint32_t>(patches.triangles.size()));
-  return patches;
+  return hierarchy;
 }
 
 VisibilityField build_visibility(PolygonModel const& model, VisibilityOptions const& options, Context& context,
@@ -112,7 +128,11 @@ VisibilityField build_visibility(PolygonModel const& model, VisibilityOptions co
   auto const start = std::chrono::steady_clock::now();
   VisibilityField field;
   field.method = options.method;
-  field.patches_asked = options.patches > 0 ? options.patches : std::max<std::size_t>(1, model.polygon_count() / 32);
+  std::size_t const patches =
+      options.patches > 0 ? options.patches : std::max<std::size_t>(1, model.polygon_count() / 64);
+  bool const adaptive = options.cut == PatchCut::adaptive && options.method == VisibilityMethod::patch;
+  field.fine_patches_asked =
+      adaptive ? std::max(patches, std::min(model.polygon_count() / kFinePolygons, kMostFinePatches)) : patches;
   field.model_hash = model_hash(model.mesh);
   Eigen::AlignedBox3d box;
   for (auto const& triangle : model.mesh.triangles) {
@@ -127,7 +147,7 @@ VisibilityField build_visibility(PolygonModel const& model, VisibilityOptions co
       field.radius = std::max(field.radius, (vertex - field.center).norm());
     }
   }
-  field.patches = model_patches(model, options.method, field.patches_asked);
+  PatchHierarchy hierarchy = model_patches(model, options.method, field.fine_patches_asked);
   if (times) times->patches = seconds_since(start);
 
   SphereLookup lookup;
@@ -172,7 +192,19 @@ VisibilityField build_visibility(PolygonModel const& model, VisibilityOptions co
   }
   std::size_t const rows = lookup.shells.size() * lookup.sphere.directions().size();
   field.lookup = std::move(lookup);
-  sample_rows(model, options, cameras, row_of_camera, rows, field, context);
+  VisibilityOptions sampling = options;
+  if (!adaptive) sampling.cut = PatchCut::even;
+  SampledRows sampled =
+      sample_rows(model, hierarchy, sampling, field.center, field.radius, cameras, row_of_camera, rows, context);
+  if (adaptive) {
+    field.fine_begins = choose_patches(hierarchy, sampled.cost, patches);
+    field.rows = fuse_columns(sampled.bits, field.fine_begins);
+  } else {
+    field.fine_begins.resize(hierarchy.fine.count() + 1);
+    std::iota(field.fine_begins.begin(), field.fine_begins.end(), 0U);
+    field.rows = std::move(sampled.bits);
+  }
+  field.patches = coarser_patches(std::move(hierarchy.fine), field.fine_begins);
   if (times) {
     times->sampling = seconds_since(start) - times->patches;
     times->pictures = cameras.size();

@@ -132,12 +132,14 @@ PatchTree::PatchTree(TriangleMesh const& mesh, std::vector<std::int32_t> const& 
   }
 }
 
-Patches PatchTree::cut(std::size_t count) const {
+PatchHierarchy PatchTree::hierarchy(std::size_t count) const {
   std::size_t const steps = count >= leaves_ ? 0 : std::min(fusions_.size(), leaves_ - count);
   // Whole parts are walked by the whole tree, so that what is fused next stands side by side.
   std::vector<bool> is_root(leaves_ + fusions_.size(), true);
   for (auto const& [first, second] : fusions_) is_root[first] = is_root[second] = false;
-  Patches patches;
+  PatchHierarchy result;
+  Patches& patches = result.fine;
+  std::vector<std::uint32_t> node_of(is_root.size());  // of each node of the tree that is a patch or fuses patches
   patches.triangles.reserve(first_triangle_.back());
   std::vector<std::uint32_t> stack;
   for (std::size_t root = 0; root < is_root.size(); ++root) {
@@ -148,6 +150,7 @@ Patches PatchTree::cut(std::size_t count) const {
       std::uint32_t const node = stack.back();
       stack.pop_back();
       if (pending == 0 && node < leaves_ + steps) {
+        node_of[node] = static_cast<std::uint32_t>(patches.begins.size());
         patches.begins.push_back(static_cast<std::uint32_t>(patches.triangles.size()));
         pending = 1;
       }
@@ -157,14 +160,18 @@ Patches PatchTree::cut(std::size_t count) const {
           patches.triangles.push_back(i);
         continue;
       }
-      Fusion const& fusion = fusions_[node - leaves_];
+      PatchHierarchy::Fusion const& fusion = fusions_[node - leaves_];
       stack.push_back(fusion.second);
       stack.push_back(fusion.first);
       if (node < leaves_ + steps) pending += 2;
     }
   }
   patches.begins.push_back(static_cast<std::uint32_t>(patches.triangles.size()));
-  return patches;
+  for (std::size_t j = steps; j < fusions_.size(); ++j) {
+    node_of[leaves_ + j] = static_cast<std::uint32_t>(patches.count() + result.fusions.size());
+    result.fusions.push_back({node_of[fusions_[j].first], node_of[fusions_[j].second]});
+  }
+  return result;
 }
 
 }  // namespace scanview

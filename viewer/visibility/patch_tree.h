@@ -22,6 +22,16 @@ struct Patches {
   std::size_t count() const { return begins.size() - 1; }
 };
 
+/// How fine patches fuse into coarser ones. Node p < fine.count() is fine patch p; node fine.count() + j is fusion j of
+/// two earlier nodes. A node's fine patches follow each other.
+struct PatchHierarchy {
+  struct Fusion {
+    std::uint32_t first, second;
+  };
+  Patches fine;
+  std::vector<Fusion> fusions;
+};
+
 /// Polygons fused into patches, and these into larger ones, until nothing neighbours anything (Meruvia 2002, section
 /// 3.1): in each step the smallest patch by area joins the neighbour with which its bounding box has the least
 /// diagonal. Neighbours share an edge, also one of three or more polygons; parts that share none never fuse. Ties are
@@ -34,15 +44,14 @@ class PatchTree {
   /// Parts of the model without a common edge: the least number of patches.
   std::size_t part_count() const { return leaves_ - fusions_.size(); }
   /// At most `count` patches, or part_count() where that is more.
-  Patches cut(std::size_t count) const;
+  Patches cut(std::size_t count) const { return hierarchy(count).fine; }
+  /// These patches, and how they fuse on.
+  PatchHierarchy hierarchy(std::size_t count) const;
 
  private:
-  struct Fusion {
-    std::uint32_t first, second;  ///< polygon, or polygon_count() + the earlier fusion
-  };
   std::size_t leaves_ = 0;
-  std::vector<Fusion> fusions_;
-  std::vector<std::uint32_t> first_triangle_;  ///< of each polygon, and the end
+  std::vector<PatchHierarchy::Fusion> fusions_;  ///< of polygons, or polygon_count() + the earlier fusion
+  std::vector<std::uint32_t> first_triangle_;    ///< of each polygon, and the end
 };
 
 }  // namespace scanview

@@ -3,12 +3,27 @@
 
 namespace scanview {
 
-/// The patches of a model as a field has them: transparent triangles, if any, in one last patch.
-Patches model_patches(PolygonModel const& model, VisibilityMethod method, std::size_t count);
+/// The patches of a model and how they fuse on. Transparent triangles, if any, make one last patch that never fuses.
+PatchHierarchy model_patches(PolygonModel const& model, VisibilityMethod method, std::size_t count);
 
-/// Fills the field's rows and sides: row_of_camera[i] gets what camera i sees. Cameras of one row are OR-ed.
-void sample_rows(PolygonModel const& model, VisibilityOptions const& options, std::vector<SampleCamera> const& cameras,
-                 std::vector<std::size_t> const& row_of_camera, std::size_t rows, VisibilityField& field,
-                 Context& context);
+/// What cameras see of fine patches.
+struct SampledRows {
+  BitRows bits;  ///< as VisibilityField::rows
+  /// Of each node of the hierarchy: the triangles that its patch would make the cameras draw, altogether. Those that
+  /// turn their other side are not drawn (VisibilitySelector).
+  std::vector<std::uint64_t> cost;
+};
+
+/// row_of_camera[i] gets what camera i sees; cameras of one row are OR-ed. center, radius: of the ball around the
+/// model.
+SampledRows sample_rows(PolygonModel const& model, PatchHierarchy const& hierarchy, VisibilityOptions const& options,
+                        Eigen::Vector3d const& center, double radius, std::vector<SampleCamera> const& cameras,
+                        std::vector<std::size_t> const& row_of_camera, std::size_t rows, Context& context);
+
+/// Coarser patches: begins[k] is the first fine patch of patch k, and the end.
+Patches coarser_patches(Patches fine, std::vector<std::uint32_t> const& begins);
+
+/// The rows of coarser patches.
+BitRows fuse_columns(BitRows const& bits, std::vector<std::uint32_t> const& begins);
 
 }  // namespace scanview

@@ -5,6 +5,7 @@
 
 #include "mesh/triangle_mesh.h"
 #include "viewer/visibility/sample_camera.h"
+#include "viewer/visibility/visibility_kernels.h"
 
 namespace scanview {
 
@@ -23,6 +24,7 @@ struct TrianglePlanes {
   double radius;
 
   TrianglePlanes(TriangleMesh const& mesh, Eigen::Vector3d const& center, double radius);
+  FacingPlanes arrays() const { return {x.data(), y.data(), z.data(), offset.data()}; }
   EyePoint eye(Eigen::Vector3d const& eye) const;
   EyePoint eye(SampleCamera const& camera) const;
   /// n · eye − offset: above 0 where the eye is before the triangle's front.

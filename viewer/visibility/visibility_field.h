@@ -17,6 +17,10 @@ namespace scanview {
 /// `id`: a bit a polygon (Meruvia 2001); `patch`: a bit a patch of polygons (Meruvia 2002).
 enum class VisibilityMethod { id, patch };
 
+/// Where the tree of patches is cut: `even`, as it grew, smallest first (Meruvia 2002); `adaptive`: where samples say
+/// that least is drawn in vain (choose_patches()): small patches where visibility changes, large ones inside.
+enum class PatchCut { even, adaptive };
+
 /// Eyes anywhere around the model: samples on shells of directions. A row for each shell's each direction.
 struct SphereLookup {
   SampleSphere sphere = SampleSphere::octahedron(0);
@@ -47,7 +51,8 @@ struct VisibilityField {
   std::variant<SphereLookup, PathLookup, GridLookup> lookup;
   std::string model_hash;  ///< of the model it was made for (model_hash())
   VisibilityMethod method = VisibilityMethod::patch;
-  std::size_t patches_asked = 0;
+  std::size_t fine_patches_asked = 0;      ///< model_patches() of so many ...
+  std::vector<std::uint32_t> fine_begins;  ///< ... of which each patch begins with this one; and the end
 
   /// The rows to OR for an eye; none: everything is drawn. At most 64 of them.
   struct Query {
@@ -64,7 +69,8 @@ struct VisibilityOptions {
   std::size_t samples = 1026;  ///< directions: 6, 18, 66, 258, 1026, 4098
   /// A person's cameras instead; their directions make the sphere, their own distances the near shell.
   std::vector<SampleCamera> cameras;
-  std::size_t patches = 0;  ///< 0: one for every 32 polygons
+  std::size_t patches = 0;  ///< 0: one for every 64 polygons
+  PatchCut cut = PatchCut::adaptive;
   /// Distances of the samples in radii of the model, ascending; infinity: orthographic.
   std::vector<double> shells = default_shells();
   int resolution = 512;  ///< of a sample's picture

@@ -186,7 +186,8 @@ std::vector<PatchPlace> patch_places(VisibilityField const& field, TriangleMesh 
 
 std::string format_visibility(VisibilityField const& field, TriangleMesh const& mesh) {
   Json header{{"method", field.method == VisibilityMethod::id ? "id" : "patch"},
-              {"patches_asked", field.patches_asked},
+              {"fine_patches_asked", field.fine_patches_asked},
+              {"fine_patches", field.fine_begins.back()},
               {"patches", field.patches.count()},
               {"model", field.model_hash},
               {"center", to_json(field.center)},
@@ -194,7 +195,11 @@ std::string format_visibility(VisibilityField const& field, TriangleMesh const& 
               {"bits", hash_bits(field.rows)},
               {"lookup", lookup_to_json(field)}};
   std::string bytes(kMagic);
-  bytes += header.dump() + '\n';
+  std::vector<bool> begins(field.fine_begins.back());
+  for (std::size_t k = 0; k + 1 < field.fine_begins.size(); ++k) begins[field.fine_begins[k]] = true;
+  std::string const flags = encode_flags(begins);
+  header["patch_bytes"] = flags.size();
+  bytes += header.dump() + '\n' + flags;
   bytes += encode_bits(field.rows, row_places(field, field.rows.rows()), patch_places(field, mesh));
   return bytes + hash_bytes(bytes);
 }
@@ -217,13 +222,15 @@ VisibilityField parse_visibility(std::string_view bytes, PolygonModel const& mod
   std::size_t const line = rest.find('\n');
   if (line == std::string_view::npos) fail("has no header");
   VisibilityField field;
-  std::size_t rows = 0, patches = 0;
+  std::size_t rows = 0, patches = 0, fine_patches = 0, patch_bytes = 0;
   std::string bits_hash;
   try {
     Json const header = Json::parse(rest.substr(0, line));
     field.model_hash = header.at("model").get<std::string>();
     field.method = header.at("method").get<std::string>() == "id" ? VisibilityMethod::id : VisibilityMethod::patch;
-    field.patches_asked = header.at("patches_asked").get<std::size_t>();
+    field.fine_patches_asked = header.at("fine_patches_asked").get<std::size_t>();
+    fine_patches = header.at("fine_patches").get<std::size_t>();
+    patch_bytes = header.at("patch_bytes").get<std::size_t>();
     patches = header.at("patches").get<std::size_t>();
     bits_hash = header.at("bits").get<std::string>();
     field.center = vector_of(header.at("center"));
@@ -234,9 +241,18 @@ VisibilityField parse_visibility(std::string_view bytes, PolygonModel const& mod
     fail(fmt::format("its header is wrong: {}", error.what()));
   }
   if (field.model_hash != model_hash(model.mesh)) fail("was made for another model");
-  field.patches = model_patches(model, field.method, field.patches_asked);
-  if (field.patches.count() != patches) fail("was made with other patches of this model: build it again");
-  field.rows = decode_bits(rest.substr(line + 1), row_places(field, rows), patch_places(field, model.mesh), path);
+  Patches fine = model_patches(model, field.method, field.fine_patches_asked).fine;
+  std::string_view const coded = rest.substr(line + 1);
+  if (fine.count() != fine_patches || patch_bytes > coded.size())
+    fail("was made with other patches of this model: build it again");
+  std::vector<bool> const begins = decode_flags(coded.substr(0, patch_bytes), fine_patches, path);
+  for (std::uint32_t p = 0; p < begins.size(); ++p) {
+    if (begins[p]) field.fine_begins.push_back(p);
+  }
+  field.fine_begins.push_back(static_cast<std::uint32_t>(fine_patches));
+  if (field.fine_begins.size() != patches + 1 || field.fine_begins.front() != 0) fail("its patches do not add up");
+  field.patches = coarser_patches(std::move(fine), field.fine_begins);
+  field.rows = decode_bits(coded.substr(patch_bytes), row_places(field, rows), patch_places(field, model.mesh), path);
   if (hash_bits(field.rows) != bits_hash) fail("its bits were coded by a version that computes differently");
   return field;
 }

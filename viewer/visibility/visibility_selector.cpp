@@ -78,8 +78,7 @@ void VisibilitySelector::take_patch(std::size_t patch, bool front, bool back, Ey
     }
     if (along < 0 && along * cone.cosine + across * cone.sine < -slack) return;
   }
-  facing_bits({planes_.x.data(), planes_.y.data(), planes_.z.data(), planes_.offset.data()},
-              {eye.x, eye.y, eye.z, eye.w}, front ? 1.0F : -1.0F, begin, end, drawn_.data());
+  facing_bits(planes_.arrays(), {eye.x, eye.y, eye.z, eye.w}, front ? 1.0F : -1.0F, begin, end, drawn_.data());
 }
 
 void VisibilitySelector::collect_ranges() {
