@@ -20,6 +20,14 @@ SampledRows sample_rows(PolygonModel const& model, PatchHierarchy const& hierarc
                         Eigen::Vector3d const& center, double radius, std::vector<SampleCamera> const& cameras,
                         std::vector<std::size_t> const& row_of_camera, std::size_t rows, Context& context);
 
+/// A field's ball and hash; its patches are not chosen yet. Throws Error{usage} for a model without extent.
+VisibilityField field_of(PolygonModel const& model, VisibilityOptions const& options);
+
+/// Samples, chooses the patches, and fills in rows; the lookup is set already.
+void sample_field(PolygonModel const& model, VisibilityOptions options, std::vector<SampleCamera> const& cameras,
+                  std::vector<std::size_t> const& row_of_camera, std::size_t rows, VisibilityField& field,
+                  Context& context, VisibilityTimes* times);
+
 /// Coarser patches: begins[k] is the first fine patch of patch k, and the end.
 Patches coarser_patches(Patches fine, std::vector<std::uint32_t> const& begins);
 

@@ -15,9 +15,11 @@ namespace {
 
 /// Beside a row, so that vectors may be read beyond it.
 constexpr int kPadding = 16;
-/// The widest window has a radius of 2^(static_cast<int>(kWindows) - 1) pixels: more parallax than that is seen by
-/// another sample.
+/// The widest window has a radius of 2^(static_cast<int>(farthest_.size()) - 1) pixels: more parallax than that is seen
+/// by another sample.
 constexpr std::size_t kWindows = 6;
+/// Without parallax windows only tell which small triangles behind are hidden.
+constexpr std::size_t kStillWindows = 4;
 /// Triangles longer than this many pixels are asked between their vertices too; a side in at most kMostSteps steps.
 constexpr int kLongPx = 8, kMostSteps = 32;
 
@@ -77,12 +79,12 @@ void TriangleSampler::draw(SampleCamera const& sample) {
 }
 
 void TriangleSampler::find_windows(std::vector<float> const& keys) {
-  farthest_.resize(kWindows);
+  farthest_.resize(parallax_ > 0 ? kWindows : kStillWindows);
   for (auto& window : farthest_) window.resize(keys.size());
   PictureSize const size{width_, height_, stride_};
   window_minimum(keys.data(), size, 1, true, farthest_[0].data());
   // Four windows of half the radius make one.
-  for (std::size_t k = 1; k < kWindows; ++k)
+  for (std::size_t k = 1; k < farthest_.size(); ++k)
     window_minimum(farthest_[k - 1].data(), size, 1 << (k - 1), false, farthest_[k].data());
   windows_are_current_ = &keys == &keys_;
 }
@@ -101,7 +103,7 @@ void TriangleSampler::list_unhidden_backs() {
                                         std::max(std::abs(b.y - a.y), std::abs(c.y - a.y)));
     auto const k = static_cast<std::size_t>(std::bit_width(static_cast<std::uint32_t>(reach + 255) >> 8));
     float const nearest = std::max(std::max(a.values[0], b.values[0]), c.values[0]);
-    if (k >= kWindows || farthest_[k][nearest_pixel(a.x, a.y)] <= nearest)
+    if (k >= farthest_.size() || farthest_[k][nearest_pixel(a.x, a.y)] <= nearest)
       backs_.push_back(static_cast<std::uint32_t>(i));
   }
 }
@@ -124,7 +126,7 @@ bool TriangleSampler::passes(std::int32_t x, std::int32_t y, float key) const {
   float const shift = parallax_ * (keys_[at] - key);
   if (!(shift > 1)) return false;
   int const k = std::min(static_cast<int>(std::bit_width(static_cast<std::uint32_t>(std::min(shift, 1e6F) - 1e-6F))),
-                         static_cast<int>(kWindows) - 1);
+                         static_cast<int>(farthest_.size()) - 1);
   return farthest_[static_cast<std::size_t>(k)][at] <= key;
 }
 

@@ -76,12 +76,16 @@ struct VisibilityOptions {
   int resolution = 512;  ///< of a sample's picture
   /// Triangles count as seen that an eye off the sample would see (TriangleSampler), as far off as this share of half
   /// the distance to the next sample. 0 leaves only the smaller than a pixel.
-  double widening = 0.15;
+  double widening = 0;
   Seen seen = Seen::nearly;  ///< in the papers: in_picture
   /// After each sample, neighbours of seen polygons that face the camera count as seen too, so many times (Meruvia
   /// 2001, section 3.1.1); −1: as long as there are any.
   int fill = 0;
   bool opposite = false;  ///< SphereLookup; always with `id`
+
+  /// A patch is drawn unless it is proven hidden from all eyes between samples (find_hidden_cells()), instead of where
+  /// samples saw it: no pixel is missed, and less is left out. Octahedron only.
+  bool conservative = false;
 
   static std::vector<double> default_shells();
   /// Throws Error{usage} that names the field.
@@ -98,6 +102,17 @@ struct VisibilityTimes {
 /// cameras leave directions uncovered. Throws Error{usage} for bad options and for a model without extent.
 VisibilityField build_visibility(PolygonModel const& model, VisibilityOptions const& options, Context& context,
                                  VisibilityTimes* times = nullptr);
+
+/// For a recorded path: a row for each `stretch` frames, of what their cameras show (PathLookup).
+VisibilityField build_path_visibility(PolygonModel const& model, std::vector<SampleCamera> cameras, std::size_t stretch,
+                                      VisibilityOptions const& options, Context& context,
+                                      VisibilityTimes* times = nullptr);
+
+/// For eyes inside the model: cells of a grid, each with six pictures from its middle, widened to the whole cell; an
+/// eye sees what its cell and those around see (GridLookup; Meruvia 2001, section 5: navigation viewer).
+VisibilityField build_grid_visibility(PolygonModel const& model, Eigen::AlignedBox3d const& box,
+                                      Eigen::Vector3i const& cells, VisibilityOptions const& options, Context& context,
+                                      VisibilityTimes* times = nullptr);
 
 /// Identifies positions and triangles of a model.
 std::string model_hash(TriangleMesh const& mesh);
