@@ -138,9 +138,14 @@ PatchHierarchy model_patches(PolygonModel const& model, VisibilityMethod method,
 
 VisibilityField field_of(PolygonModel const& model, VisibilityOptions const& options) {
   options.validate();
-  VisibilityField field;
+  VisibilityField field = field_ball(model);
   field.method = options.method;
   field.model_hash = model_hash(model.mesh);
+  return field;
+}
+
+VisibilityField field_ball(PolygonModel const& model) {
+  VisibilityField field;
   auto const for_each_corner = [&](auto const& use) {
     for (auto const& triangle : model.mesh.triangles) {
       for (int k = 0; k < 3; ++k) use(model.mesh.vertices[static_cast<std::size_t>(triangle[k])].cast<double>().eval());

@@ -41,6 +41,11 @@ std::vector<Eigen::Vector3d> unseen_eyes(VisibilityField const& field, std::size
   return eyes;
 }
 
+SampleCamera eye_camera(VisibilityField const& field, Eigen::Vector3d const& eye, int resolution) {
+  Eigen::Vector3d const from_center = eye - field.center;
+  return ball_camera(field.center, field.radius, from_center, from_center.norm() / field.radius, resolution);
+}
+
 VisibilityFigures check_visibility(VisibilityField const& field, TriangleMesh const& drawn,
                                    std::vector<std::int32_t> const& polygons, bool facing,
                                    std::vector<Eigen::Vector3d> const& eyes, int resolution, Context& context) {
@@ -69,9 +74,7 @@ VisibilityFigures check_visibility(VisibilityField const& field, TriangleMesh co
       [&](std::size_t e) {
         Worker& worker = workers.local();
         One& one = each[e];
-        Eigen::Vector3d const from_center = eyes[e] - field.center;
-        SampleCamera const camera =
-            ball_camera(field.center, field.radius, from_center, from_center.norm() / field.radius, resolution);
+        SampleCamera const camera = eye_camera(field, eyes[e], resolution);
         auto const ranges = worker.selector.select(eyes[e]);
         one.ranges = static_cast<double>(ranges.size());
         one.patches = static_cast<double>(worker.selector.patches());
@@ -111,25 +114,47 @@ VisibilityFigures check_visibility(VisibilityField const& field, TriangleMesh co
   return figures;
 }
 
-cv::Mat3b missed_pixels(VisibilityField const& field, TriangleMesh const& drawn, VisibilitySelector& selector,
-                        SampleCamera const& camera, std::size_t* wrong) {
-  RasterMesh const raster = numbered(drawn);
-  TrianglePlanes const planes(drawn, field.center, field.radius);
-  TriangleSampler sampler(raster, planes, bounds_of(drawn));
-  sampler.sample(camera, Seen::in_picture);
-  std::vector<std::uint8_t> is_drawn(drawn.triangles.size());
-  mark(selector.select(camera.object_from_camera.translation()), is_drawn);
-  EyePoint const eye = planes.eye(camera);
+namespace {
+
+/// Calls use(x, y, triangle, grey value) for each pixel.
+template <typename Use>
+cv::Mat3b shaded(TriangleMesh const& mesh, SampleCamera const& camera, Use const& color) {
+  RasterMesh const raster = numbered(mesh);
+  Eigen::AlignedBox3d const bounds = bounds_of(mesh);
   cv::Mat3b picture(camera.camera.height(), camera.camera.width(), cv::Vec3b(255, 255, 255));
-  std::size_t missed = 0;
+  if (mesh.triangles.empty()) return picture;
+  TrianglePlanes const planes(mesh, bounds.center(), std::max(bounds.diagonal().norm() / 2, 1e-30));
+  TriangleSampler sampler(raster, planes, bounds);
+  sampler.sample(camera, Seen::in_picture);
+  EyePoint const eye = planes.eye(camera);
   sampler.for_each_pixel([&](int x, int y, std::uint32_t triangle) {
     float const light = std::min(1.0F, std::abs(planes.cosine(triangle, eye)));
-    auto const grey = static_cast<std::uint8_t>(40 + 200 * light);
-    picture(y, x) = is_drawn[triangle] != 0 ? cv::Vec3b(grey, grey, grey) : cv::Vec3b(0, 0, 255);
-    if (is_drawn[triangle] == 0) ++missed;
+    picture(y, x) = color(triangle, static_cast<std::uint8_t>(40 + 200 * light));
   });
-  if (wrong) *wrong = missed;
   return picture;
+}
+
+}  // namespace
+
+MissedPixels missed_pixels(TriangleMesh const& drawn, std::span<IndexRange const> ranges, SampleCamera const& camera) {
+  std::vector<std::uint8_t> is_drawn(drawn.triangles.size());
+  mark(ranges, is_drawn);
+  MissedPixels result;
+  result.picture = shaded(drawn, camera, [&](std::uint32_t triangle, std::uint8_t grey) {
+    if (is_drawn[triangle] != 0) return cv::Vec3b(grey, grey, grey);
+    ++result.count;
+    return cv::Vec3b(0, 0, 255);
+  });
+  return result;
+}
+
+cv::Mat3b selection_picture(TriangleMesh const& drawn, std::span<IndexRange const> ranges, SampleCamera const& camera) {
+  TriangleMesh part;
+  part.vertices = drawn.vertices;
+  for (IndexRange const& range : ranges)
+    part.triangles.insert(part.triangles.end(), drawn.triangles.begin() + range.first,
+                          drawn.triangles.begin() + range.first + range.count);
+  return shaded(part, camera, [](std::uint32_t, std::uint8_t grey) { return cv::Vec3b(grey, grey, grey); });
 }
 
 }  // namespace scanview

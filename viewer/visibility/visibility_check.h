@@ -11,6 +11,9 @@ namespace scanview {
 std::vector<Eigen::Vector3d> unseen_eyes(VisibilityField const& field, std::size_t count, double nearest,
                                          double farthest, std::uint64_t seed);
 
+/// A camera at the eye that looks at the model and just holds it.
+SampleCamera eye_camera(VisibilityField const& field, Eigen::Vector3d const& eye, int resolution);
+
 /// How a selection does, over some eyes.
 struct VisibilityFigures {
   double culling_rate = 0;       ///< share of polygons not drawn, mean
@@ -27,8 +30,14 @@ VisibilityFigures check_visibility(VisibilityField const& field, TriangleMesh co
                                    std::vector<std::int32_t> const& polygons, bool facing,
                                    std::vector<Eigen::Vector3d> const& eyes, int resolution, Context& context);
 
-/// The picture of one eye, in grey, with wrong pixels in red.
-cv::Mat3b missed_pixels(VisibilityField const& field, TriangleMesh const& drawn, VisibilitySelector& selector,
-                        SampleCamera const& camera, std::size_t* wrong = nullptr);
+/// The whole model's picture in grey; in red where the ranges lack what it shows.
+struct MissedPixels {
+  cv::Mat3b picture;
+  std::size_t count = 0;
+};
+MissedPixels missed_pixels(TriangleMesh const& drawn, std::span<IndexRange const> ranges, SampleCamera const& camera);
+
+/// The picture of what is in these ranges, in grey, two-sided: of a selection also from where it was not made for.
+cv::Mat3b selection_picture(TriangleMesh const& drawn, std::span<IndexRange const> ranges, SampleCamera const& camera);
 
 }  // namespace scanview

@@ -114,6 +114,9 @@ VisibilityField build_grid_visibility(PolygonModel const& model, Eigen::AlignedB
                                       Eigen::Vector3i const& cells, VisibilityOptions const& options, Context& context,
                                       VisibilityTimes* times = nullptr);
 
+/// Only the ball around a model: center and radius. Throws Error{usage} for a model without extent.
+VisibilityField field_ball(PolygonModel const& model);
+
 /// Identifies positions and triangles of a model.
 std::string model_hash(TriangleMesh const& mesh);
 
