@@ -185,6 +185,7 @@ class ModelWindow final : public WindowLoop {
   }
 
   void add_camera() {
+    if (viewport_.width < 1) return;  // before the first picture
     auto const& eye = control_.current();
     cameras_.add({fit_camera(eye.camera, viewport_.width, viewport_.height), eye.object_from_camera, ""});
     // A full disk must not end the session.

@@ -23,8 +23,8 @@ struct ModelWindowOptions : BasicWindowOptions {
 
 struct ModelWindowResult {
   std::optional<FrameTimes> times;  ///< where they were asked for
-  double culling_rate = 0;          ///< over those frames: mean share of triangles that were not drawn
-  double select_microseconds = 0;   ///< over those frames: median time to choose what is drawn
+  double culling_rate = 0;          ///< over those frames and the few before: mean share of triangles not drawn
+  double select_microseconds = 0;   ///< over the same: median time to choose what is drawn
 };
 
 /// The interactive viewer of a polygon model; returns when the person closes it. model_window_help() says the mouse and
