@@ -2,12 +2,19 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "acquire/scan_set_file.h"
 #include "base/error.h"
 #include "cli/stages.h"
+#include "viewer/visibility/visibility_file.h"
+#include "viewer/window/commands.h"
+#include "viewer/window/model_window.h"
 #include "viewer/window/view_window.h"
 
 namespace scanview {
@@ -29,7 +36,16 @@ std::shared_ptr<ViewLibrary> open_unregistered(fs::path const& folder, Context& 
   return std::make_shared<ViewLibrary>(set, read_view_meshes(folder, set, context));
 }
 
-void view(fs::path const& folder, WindowOptions options, Session& session) {
+void report_times(FrameTimes const& times, int frames, Session& session) {
+  session.report["frame_milliseconds"] = times.frame_milliseconds;
+  session.report["panel_milliseconds"] = times.panel_milliseconds;
+  session.report["fps_median"] = times.frames_per_second;
+  std::cout << fmt::format(
+      "frame {:.2f} ms, panel {:.2f} ms, {:.1f} frames/s (medians of {} frames, picture {} x {})\n",
+      times.frame_milliseconds, times.panel_milliseconds, times.frames_per_second, frames, times.width, times.height);
+}
+
+void view_set(fs::path const& folder, WindowOptions options, Session& session) {
   Context& context = session.context;
   options.validate();
   options.title = "scanview " + folder.string();
@@ -42,29 +58,43 @@ void view(fs::path const& folder, WindowOptions options, Session& session) {
     if (options.frames == 0) options.mode = WindowMode::mark;
   }
   WindowResult const result = view_window(library, folder, options, context);
-  if (result.times) {
-    session.report["frame_milliseconds"] = result.times->frame_milliseconds;
-    session.report["panel_milliseconds"] = result.times->panel_milliseconds;
-    session.report["fps_median"] = result.times->frames_per_second;
-    std::cout << fmt::format(
-        "frame {:.2f} ms, panel {:.2f} ms, {:.1f} frames/s (medians of {} frames, picture {} x {})\n",
-        result.times->frame_milliseconds, result.times->panel_milliseconds, result.times->frames_per_second,
-        options.frames, result.times->width, result.times->height);
-  }
+  if (result.times) report_times(*result.times, options.frames, session);
   if (!result.failures.empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
+}
+
+void view_model_file(fs::path const& path, fs::path const& visibility, ModelWindowOptions options, Session& session) {
+  Context& context = session.context;
+  options.validate();
+  options.title = "scanview " + path.string();
+  PolygonModel model = read_polygon_model(path);
+  for (auto const& note : model.notes) context.log(note);
+  std::optional<VisibilityField> field;
+  if (!visibility.empty()) field = read_visibility(visibility, model);
+  bool const is_culled = field.has_value();
+  ModelWindowResult const result = view_model(std::move(model), std::move(field), options, context);
+  if (!result.times) return;
+  report_times(*result.times, options.frames, session);
+  if (!is_culled) return;
+  session.report["culling_rate"] = result.culling_rate;
+  session.report["select_microseconds"] = result.select_microseconds;
+  std::cout << fmt::format("culling rate {:.1f} %, chosen in {:.1f} us\n", 100 * result.culling_rate,
+                           result.select_microseconds);
 }
 
 }  // namespace
 
 void add_view(CLI::App& app, Session& session) {
   struct Arguments {
-    fs::path set;
+    fs::path path, visibility, cameras;
     WindowOptions options;
-    std::string back_end = "auto";
+    std::string back_end = "auto", up = "y";
   };
+  static std::map<std::string, UpAxis> const kAxes = {{"x", UpAxis::x},        {"y", UpAxis::y},
+                                                      {"z", UpAxis::z},        {"-x", UpAxis::minus_x},
+                                                      {"-y", UpAxis::minus_y}, {"-z", UpAxis::minus_z}};
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("view", "A window to turn the object in");
-  verb->add_option("set", arguments->set, "The scan set, meshed")->required();
+  verb->add_option("path", arguments->path, "The scan set, meshed; or a file with a polygon model")->required();
   verb->add_option("--width", arguments->options.width, "Of the window, in pixels");
   verb->add_option("--height", arguments->options.height, "Of the window, in pixels");
   verb->add_option("--pictures", arguments->options.pictures, "Folder where P saves pictures and K a camera path");
@@ -73,12 +103,35 @@ void add_view(CLI::App& app, Session& session) {
   verb->add_option("--frames", arguments->options.frames,
                    "Draw a full turn of so many frames as fast as it goes, print their times, and quit")
       ->check(CLI::Range(1, 100000));
-  verb->footer(window_help());
-  verb->callback([arguments, &session] {
+  std::string const group = "Of a model";
+  std::vector<CLI::Option*> const of_models = {
+      verb->add_option("--visibility", arguments->visibility, "What can be seen from where (visibility build)"),
+      verb->add_option("--cameras", arguments->cameras, "Where C adds cameras, for visibility build --cameras"),
+      verb->add_option("--up", arguments->up, "The axis that is up: x, y, z, -x, -y or -z")
+          ->check(CLI::IsMember(kAxes))};
+  for (CLI::Option* const option : of_models) option->group(group);
+  verb->footer("A set:\n" + window_help() + "\n\nA model:\n" + model_window_help());
+  verb->callback([arguments, of_models, &session] {
     session.verb = "view";
-    if (arguments->back_end != "auto")
-      arguments->options.back_end = arguments->back_end == "cpu" ? BackEnd::cpu : BackEnd::gl;
-    session.work = [arguments, &session] { view(arguments->set, arguments->options, session); };
+    session.work = [arguments, of_models, &session] {
+      WindowOptions& options = arguments->options;
+      if (!fs::is_regular_file(arguments->path)) {
+        for (CLI::Option const* const option : of_models) {
+          if (option->count() > 0)
+            throw Error(ErrorCode::usage, {}, option->get_name() + " is for a polygon model, not for a scan set");
+        }
+        if (arguments->back_end != "auto") options.back_end = arguments->back_end == "cpu" ? BackEnd::cpu : BackEnd::gl;
+        view_set(arguments->path, options, session);
+        return;
+      }
+      if (arguments->back_end == "gl")
+        throw Error(ErrorCode::usage, {}, "--back-end: models are drawn by the processor");
+      ModelWindowOptions of_model;
+      static_cast<BasicWindowOptions&>(of_model) = options;
+      of_model.up = kAxes.at(arguments->up);
+      of_model.cameras = arguments->cameras;
+      view_model_file(arguments->path, arguments->visibility, of_model, session);
+    };
   });
 }
 

@@ -113,10 +113,11 @@ std::span<IndexRange const> VisibilitySelector::answer(VisibilityField::Query co
     if (triangles_ == 0) ranges_.clear();
     return ranges_;
   }
-  if (!facing_ && query.cell < kept_.size() && !kept_[query.cell].empty()) {
-    triangles_ = 0;
-    for (IndexRange const& range : kept_[query.cell]) triangles_ += range.count;
-    return kept_[query.cell];
+  if (!facing_ && query.cell < kept_.size() && kept_[query.cell].patches > 0) {
+    Kept const& kept = kept_[query.cell];
+    triangles_ = kept.triangles;
+    patches_ = kept.patches;
+    return kept.ranges;
   }
   std::fill(drawn_.begin(), drawn_.end(), 0);
   field_->rows.visit_union({query.rows, query.count}, [&](std::size_t word, std::uint64_t bits) {
@@ -130,7 +131,8 @@ std::span<IndexRange const> VisibilitySelector::answer(VisibilityField::Query co
   collect_ranges();
   if (facing_) return ranges_;
   if (kept_.size() <= query.cell) kept_.resize(query.cell + 1);
-  return kept_[query.cell] = ranges_;
+  kept_[query.cell] = {ranges_, triangles_, patches_};
+  return ranges_;
 }
 
 std::span<IndexRange const> VisibilitySelector::select(Eigen::Vector3d const& eye) {

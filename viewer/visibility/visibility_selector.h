@@ -54,7 +54,11 @@ class VisibilitySelector {
   std::vector<PatchCone> cones_;
   std::vector<std::uint64_t> drawn_;  ///< a bit a triangle
   std::vector<IndexRange> ranges_;
-  std::vector<std::vector<IndexRange>> kept_;  ///< by cell, without facing
+  struct Kept {
+    std::vector<IndexRange> ranges;
+    std::size_t triangles = 0, patches = 0;
+  };
+  std::vector<Kept> kept_;  ///< by cell, without facing
   std::size_t triangles_ = 0, patches_ = 0;
   bool whole_ = false;
   int tests_ = 0;

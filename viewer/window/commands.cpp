@@ -4,12 +4,11 @@
 #include <GLFW/glfw3.h>
 
 namespace scanview {
+namespace {
 
-std::optional<Command> command_of_key(int key, WindowMode mode) {
-  auto const into = [&](WindowMode wanted, Command command) { return mode == wanted ? Command::look : command; };
+/// What a key means whatever is looked at.
+std::optional<Command> common_command_of_key(int key) {
   switch (key) {
-    case GLFW_KEY_ESCAPE:
-      return mode == WindowMode::look ? Command::quit : Command::look;
     case GLFW_KEY_H:
       return Command::help;
     case GLFW_KEY_TAB:
@@ -18,6 +17,18 @@ std::optional<Command> command_of_key(int key, WindowMode mode) {
       return Command::reset;
     case GLFW_KEY_P:
       return Command::save_picture;
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::optional<Command> command_of_key(int key, WindowMode mode) {
+  auto const into = [&](WindowMode wanted, Command command) { return mode == wanted ? Command::look : command; };
+  switch (key) {
+    case GLFW_KEY_ESCAPE:
+      return mode == WindowMode::look ? Command::quit : Command::look;
     case GLFW_KEY_M:
       return into(WindowMode::measure, Command::measure);
     case GLFW_KEY_N:
@@ -27,6 +38,7 @@ std::optional<Command> command_of_key(int key, WindowMode mode) {
     default:
       break;
   }
+  if (auto const common = common_command_of_key(key)) return common;
   if (shows_picture(mode)) {
     switch (key) {
       case GLFW_KEY_LEFT:
@@ -52,6 +64,31 @@ std::optional<Command> command_of_key(int key, WindowMode mode) {
   return std::nullopt;
 }
 
+std::optional<Command> model_command_of_key(int key) {
+  switch (key) {
+    case GLFW_KEY_ESCAPE:
+      return Command::quit;
+    case GLFW_KEY_SPACE:
+      return Command::turntable;
+    case GLFW_KEY_F:
+      return Command::freeze_eye;
+    case GLFW_KEY_V:
+      return Command::toggle_visibility;
+    case GLFW_KEY_T:
+      return Command::toggle_facing;
+    case GLFW_KEY_G:
+      return Command::toggle_culled;
+    case GLFW_KEY_N:
+      return Command::toggle_lines;
+    case GLFW_KEY_C:
+      return Command::add_camera;
+    case GLFW_KEY_U:
+      return Command::next_up;
+    default:
+      return common_command_of_key(key);
+  }
+}
+
 std::optional<std::size_t> view_of_key(int key) {
   if (key < GLFW_KEY_1 || key > GLFW_KEY_9) return std::nullopt;
   return static_cast<std::size_t>(key - GLFW_KEY_1);
@@ -75,6 +112,26 @@ std::string window_help() {
          "Esc: leave a mode; quit\n"
          "In N and O: left and right change the view, up and down the point, Enter closes an outline, "
          "Backspace removes the last";
+}
+
+std::string model_window_help() {
+  return "left drag: turn\n"
+         "right, middle or shift drag: pan\n"
+         "wheel: nearer, further\n"
+         "double click: the pivot that turning is about\n"
+         "space: turntable\n"
+         "R: back to the start\n"
+         "P: save a picture\n"
+         "V: only what the visibility file says can be seen, or everything\n"
+         "T: leave out what turns its back, too\n"
+         "F: freeze the eye that this is chosen for, or let it follow\n"
+         "G: show faintly what is left out\n"
+         "N: silhouettes and creases on white paper\n"
+         "U: another of the model's axes is up\n"
+         "C: add a camera for visibility build --cameras\n"
+         "Tab: panel on and off\n"
+         "H: this help\n"
+         "Esc: quit";
 }
 
 }  // namespace scanview

@@ -35,16 +35,28 @@ enum class Command {
   next_point,
   remove_last,
   close_outline,
+  // Of a model's window:
+  freeze_eye,
+  toggle_visibility,
+  toggle_facing,
+  toggle_culled,
+  toggle_lines,
+  add_camera,
+  next_up,
 };
 
 /// The command of a key (GLFW's number); nothing where it has none in this mode. M, N and O lead into their modes and,
 /// pressed there, back; Escape leaves a mode before it closes the window.
 std::optional<Command> command_of_key(int key, WindowMode mode);
 
+/// The same in the window of a model, which has no modes.
+std::optional<Command> model_command_of_key(int key);
+
 /// 0 to 8 for the keys 1 to 9.
 std::optional<std::size_t> view_of_key(int key);
 
 /// The mouse and the keys, one a line.
 std::string window_help();
+std::string model_window_help();
 
 }  // namespace scanview

@@ -14,7 +14,10 @@ Json Keyframes::to_json() const {
 }
 
 void Keyframes::save(std::filesystem::path const& folder) {
-  auto const file = file_.empty() ? first_free(folder, "scanview-path-", ".json") : file_;
+  save_as(file_.empty() ? first_free(folder, "scanview-path-", ".json") : file_);
+}
+
+void Keyframes::save_as(std::filesystem::path const& file) {
   write_json(file, to_json());
   file_ = file;
 }

@@ -23,6 +23,8 @@ class Keyframes {
   /// Writes them to scanview-path-NNN.json in the folder, the first number that is free, and to the same file from then
   /// on. Throws Error{io}.
   void save(std::filesystem::path const& folder);
+  /// Writes them to that file now, and by save() from then on. Throws Error{io}.
+  void save_as(std::filesystem::path const& file);
   std::filesystem::path const& file() const { return file_; }  ///< empty before the first save
 
  private:

@@ -13,6 +13,12 @@ using Eigen::Vector3d;
 
 namespace {
 constexpr int kPixels = 480;  // of framing cameras, until a window gives them its size
+
+ScanSet set_about(Vector3d const& center) {
+  ScanSet set;
+  set.center = center;
+  return set;
+}
 }  // namespace
 
 OrbitControl::OrbitControl(ScanSet const& set, double radius)
@@ -26,6 +32,11 @@ OrbitControl::OrbitControl(ScanSet const& set, double radius)
                          : framing_camera(set, frame_, direction_to_eye(camera, *view.object_from_camera, set.center),
                                           kPixels, kPixels));
   }
+  reset();
+}
+
+OrbitControl::OrbitControl(Vector3d const& center, OrbitFrame const& frame)
+    : center_(center), frame_(frame), start_(framing_camera(set_about(center), frame, frame.start, kPixels, kPixels)) {
   reset();
 }
 

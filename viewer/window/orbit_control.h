@@ -11,6 +11,8 @@ class OrbitControl {
  public:
   /// `radius` is the object's (ViewLibrary::radius). Throws Error{bad_input} where a view has no pose.
   OrbitControl(ScanSet const& set, double radius);
+  /// Of something that has no views, about its centre: begins where framing_camera() stands.
+  OrbitControl(Eigen::Vector3d const& center, OrbitFrame const& frame);
   PathCamera const& current() const { return current_; }
   /// Looks from where `other` does, about its pivot: after the set has changed under it.
   void take_eye_of(OrbitControl const& other);

@@ -1,17 +1,15 @@
 #include "viewer/window/panel.h"
 
-#include <backends/imgui_impl_glfw.h>
-#include <backends/imgui_impl_opengl3.h>
 #include <fmt/format.h>
 #include <imgui.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cstdint>
 
 namespace scanview {
 namespace {
 
-constexpr float kWidth = 292, kStripHeight = 148;  // units of the screen at the usual size of letters
+constexpr float kStripHeight = 148;  // units of the screen at the usual size of letters
 
 ImU32 color(Eigen::Vector3f const& rgb, float alpha = 1) {
   return ImGui::GetColorU32(ImVec4(rgb.x(), rgb.y(), rgb.z(), alpha));
@@ -24,13 +22,6 @@ void lines_of(std::vector<std::string> const& lines) {
 template <typename Choice>
 void radio(char const* label, Choice& current, Choice value) {
   if (ImGui::RadioButton(label, current == value)) current = value;
-}
-
-void draw_times(PanelContent const& content) {
-  double const total = content.frame_milliseconds + content.panel_milliseconds;
-  ImGui::Text("%.0f frames/s%s%s", total > 0 ? 1000 / total : 0, content.half_resolution ? ", half resolution" : "",
-              content.reading ? ", reading" : "");
-  ImGui::Text("frame %.1f ms, panel %.1f ms", content.frame_milliseconds, content.panel_milliseconds);
 }
 
 void draw_stages(PanelContent const& content) {
@@ -209,108 +200,17 @@ void draw_strip(PanelContent const& content, float scale) {
   }
 }
 
-void draw_overlay(Overlay const& overlay, ImVec2 const& corner, ImVec2 const& size, float scale) {
-  ImDrawList& list = *ImGui::GetBackgroundDrawList();
-  list.PushClipRect(corner, ImVec2(corner.x + size.x, corner.y + size.y));
-  auto const place = [&](Eigen::Vector2d const& p) {
-    return ImVec2(corner.x + static_cast<float>(p.x() + 0.5) / scale,
-                  corner.y + static_cast<float>(p.y() + 0.5) / scale);
-  };
-  for (auto const& line : overlay.lines) {
-    std::size_t const count = line.points.size() < 2 ? 0 : line.points.size() - (line.closed ? 0 : 1);
-    for (std::size_t i = 0; i < count; ++i) {
-      ImVec2 const a = place(line.points[i]), b = place(line.points[(i + 1) % line.points.size()]);
-      list.AddLine(a, b, IM_COL32(0, 0, 0, 160), 4);
-      list.AddLine(a, b, color(line.color), 2);
-    }
-  }
-  for (auto const& dot : overlay.dots) {
-    ImVec2 const at = place(dot.at);
-    list.AddCircleFilled(at, 4, IM_COL32(0, 0, 0, 200));
-    list.AddCircleFilled(at, 3, color(dot.color));
-    if (dot.label.empty()) continue;
-    ImVec2 const from(at.x + 8, at.y - 18), text = ImGui::CalcTextSize(dot.label.c_str());
-    list.AddRectFilled(ImVec2(from.x - 3, from.y - 2), ImVec2(from.x + text.x + 3, from.y + text.y + 2),
-                       IM_COL32(0, 0, 0, 180), 3);
-    list.AddText(from, color(dot.color), dot.label.c_str());
-  }
-  list.PopClipRect();
-}
-
-void draw_message(std::string const& message, ImVec2 const& corner, ImVec2 const& size) {
-  ImDrawList& list = *ImGui::GetBackgroundDrawList();
-  float const width = std::max(1.0F, size.x - 32);
-  ImVec2 const text = ImGui::CalcTextSize(message.c_str(), nullptr, false, width);
-  ImVec2 const from(corner.x + 16, corner.y + size.y - text.y - 16);
-  list.AddRectFilled(ImVec2(from.x - 6, from.y - 4), ImVec2(from.x + text.x + 6, from.y + text.y + 4),
-                     IM_COL32(0, 0, 0, 190), 4);
-  list.AddText(nullptr, 0, from, IM_COL32(235, 235, 235, 255), message.c_str(), nullptr, width);
-}
-
 }  // namespace
 
-struct Panel::State {
-  GlfwWindow& window;
-  float scale = 1;
-};
-
-Panel::Panel(GlfwWindow& window) : state_(std::make_unique<State>(State{window})) {
-  state_->scale = static_cast<float>(window.content_scale());
-  IMGUI_CHECKVERSION();
-  ImGui::CreateContext();
-  ImGuiIO& io = ImGui::GetIO();
-  io.IniFilename = nullptr;  // leaves no file where it was started
-  io.LogFilename = nullptr;
-  ImGui::StyleColorsDark();
-  ImGui::GetStyle().ScaleAllSizes(state_->scale);
-  ImGui::GetStyle().WindowRounding = 0;
-  ImFontConfig font;
-  font.SizePixels = std::floor(13 * state_->scale);
-  io.Fonts->AddFontDefault(&font);
-  ImGui_ImplGlfw_InitForOpenGL(window.handle(), true);  // calls what the window listens with, too
-  ImGui_ImplOpenGL3_Init("#version 330 core");
-}
-
-Panel::~Panel() {
-  ImGui_ImplOpenGL3_Shutdown();
-  ImGui_ImplGlfw_Shutdown();
-  ImGui::DestroyContext();
-}
-
-bool Panel::takes_keys() const { return visible && ImGui::GetIO().WantTextInput; }
-
 Viewport Panel::viewport(int width, int height, WindowMode mode) const {
-  if (!visible) return {0, 0, width, height};
-  double const pixels = state_->scale * state_->window.pixels_per_unit();
-  // In a small window the picture comes first.
-  int const left = std::min(static_cast<int>(kWidth * pixels), width / 2);
-  int const below = shows_picture(mode) ? 0 : std::min(static_cast<int>(kStripHeight * pixels), height / 4);
-  return {left, 0, std::max(1, width - left), std::max(1, height - below)};
+  return frame_.viewport(width, height, shows_picture(mode) ? 0 : kStripHeight);
 }
 
 PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport const& viewport) {
   PanelAnswer answer;
-  ImGui_ImplOpenGL3_NewFrame();
-  ImGui_ImplGlfw_NewFrame();
-  ImGui::NewFrame();
-  auto const pixels = static_cast<float>(state_->window.pixels_per_unit());
-  ImVec2 const all = ImGui::GetIO().DisplaySize;
-  ImVec2 const corner(static_cast<float>(viewport.x) / pixels, static_cast<float>(viewport.y) / pixels);
-  ImVec2 const size(static_cast<float>(viewport.width) / pixels, static_cast<float>(viewport.height) / pixels);
-  draw_overlay(overlay, corner, size, pixels);
-  if (visible && !content.message.empty()) draw_message(content.message, corner, size);
-  if (visible) {
-    constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
-                                        ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
-                                        ImGuiWindowFlags_NoBackground;
-    ImGui::SetNextWindowPos(ImVec2(0, 0));
-    ImGui::SetNextWindowSize(ImVec2(corner.x, all.y));
-    ImGui::Begin("panel", nullptr, kFixed & ~ImGuiWindowFlags_NoScrollbar);
-    ImGui::TextWrapped("%s", content.set_name.c_str());
-    draw_times(content);
-    ImGui::Separator();
+  auto const panel = [&] {
     if (!shows_picture(content.mode)) {
-      draw_sphere(content, state_->scale, answer);
+      draw_sphere(content, frame_.scale(), answer);
       draw_look(content, answer);
       ImGui::Separator();
     }
@@ -326,17 +226,8 @@ PanelAnswer Panel::draw(PanelContent& content, Overlay const& overlay, Viewport 
       ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "views that cannot be shown: %zu", content.failures.size());
       lines_of(content.failures);
     }
-    ImGui::End();
-    if (size.y < all.y) {
-      ImGui::SetNextWindowPos(ImVec2(corner.x, size.y));
-      ImGui::SetNextWindowSize(ImVec2(all.x - corner.x, all.y - size.y));
-      ImGui::Begin("strip", nullptr, kFixed);
-      draw_strip(content, state_->scale);
-      ImGui::End();
-    }
-  }
-  ImGui::Render();
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  };
+  frame_.draw(content, overlay, viewport, panel, [&] { draw_strip(content, frame_.scale()); });
   return answer;
 }
 
