@@ -109,7 +109,7 @@ TEST(SampleSphere, CamerasOnOneCircleCoverNothing) {
 
 TEST(SampleSphere, CamerasInOneHalfSpaceCoverOnlyThat) {
   std::vector<Eigen::Vector3d> above;
-  for (auto const& d : SampleSphere::octahedron(3).directions()) {
+  for (SampleSphere const sphere = SampleSphere::octahedron(3); auto const& d : sphere.directions()) {
     if (d.z() > -1e-9) above.push_back(d);
   }
   SampleSphere const sphere = SampleSphere::hull(above);

@@ -469,10 +469,11 @@ HWY_INLINE void DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, Placed
 
 template <bool kListed>
 HWY_INLINE void DrawMesh(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
-                         std::size_t count, TileArea const& area, IdTarget const& target) {
+                         std::size_t count, float behind, TileArea const& area, IdTarget const& target) {
   Floats const d;
   int const lanes = static_cast<int>(hn::Lanes(d));
   IdWriter const writer(target);
+  PlacedVertex moved[3];
   for (std::size_t i = 0; i < count; ++i) {
     std::uint32_t const triangle = kListed ? list[i] : static_cast<std::uint32_t>(i);
     PlacedVertex const& a = vertices[corners[3 * std::size_t{triangle}]];
@@ -485,24 +486,30 @@ HWY_INLINE void DrawMesh(PlacedVertex const* vertices, std::int32_t const* corne
     int const top = (std::min(std::min(a.y, b->y), c->y) + 255) >> 8, bottom = std::max(std::max(a.y, b->y), c->y) >> 8;
     if (left > right || top > bottom) continue;
     if (area2 < 0) std::swap(b, c);
+    if (kListed) {
+      for (int k = 0; k < 3; ++k) moved[k] = *(k == 0 ? &a : k == 1 ? b : c);
+      for (auto& vertex : moved) vertex.values[0] -= behind;
+    }
+    PlacedVertex const &first = kListed ? moved[0] : a, &second = kListed ? moved[1] : *b,
+                       &third = kListed ? moved[2] : *c;
     if (right - left < lanes && bottom - top < 64 && left >= area.left && right < area.right && top >= area.top &&
         bottom < area.bottom) {
-      DrawSmallId(a, *b, *c, triangle, static_cast<std::int32_t>(area2 < 0 ? -area2 : area2), left, top, bottom,
-                  target);
+      DrawSmallId(first, second, third, triangle, static_cast<std::int32_t>(area2 < 0 ? -area2 : area2), left, top,
+                  bottom, target);
     } else {
-      DrawTriangle(a, *b, *c, triangle, area, writer);
+      DrawTriangle(first, second, third, triangle, area, writer);
     }
   }
 }
 
 void DrawMeshFronts(PlacedVertex const* vertices, std::int32_t const* corners, std::size_t count, TileArea const& area,
                     IdTarget const& target) {
-  DrawMesh<false>(vertices, corners, nullptr, count, area, target);
+  DrawMesh<false>(vertices, corners, nullptr, count, 0, area, target);
 }
 
 void DrawMeshIds(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
-                 std::size_t count, TileArea const& area, IdTarget const& target) {
-  DrawMesh<true>(vertices, corners, list, count, area, target);
+                 std::size_t count, float behind, TileArea const& area, IdTarget const& target) {
+  DrawMesh<true>(vertices, corners, list, count, behind, area, target);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -544,8 +551,8 @@ void draw_mesh_fronts(PlacedVertex const* vertices, std::int32_t const* corners,
 }
 
 void draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
-                   std::size_t count, TileArea const& area, IdTarget const& target) {
-  HWY_DYNAMIC_DISPATCH(DrawMeshIds)(vertices, corners, list, count, area, target);
+                   std::size_t count, float behind, TileArea const& area, IdTarget const& target) {
+  HWY_DYNAMIC_DISPATCH(DrawMeshIds)(vertices, corners, list, count, behind, area, target);
 }
 
 std::vector<char const*> kernel_targets() {

@@ -110,7 +110,9 @@ SampleSphere SampleSphere::hull(std::vector<Vector3d> const& directions) {
     std::size_t const i = by_x[k].second;
     if (sphere.representative_[i] != directions.size()) continue;
     sphere.representative_[i] = sphere.directions_.size();
-    Vector3d const unit = directions[i].normalized();
+    // Unit vectors stay as they are, to the bit.
+    double const length = directions[i].norm();
+    Vector3d const unit = std::abs(length - 1) < 1e-15 ? directions[i] : Vector3d(directions[i] / length);
     for (std::size_t j = k + 1; j < by_x.size() && by_x[j].first <= by_x[k].first + kSame; ++j) {
       std::size_t const other = by_x[j].second;
       if ((directions[other].normalized() - unit).norm() < kSame)

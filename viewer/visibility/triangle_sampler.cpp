@@ -59,7 +59,11 @@ void TriangleSampler::draw(SampleCamera const& sample) {
     find_windows(keys_);
     list_unhidden_backs();
     if (!backs_.empty()) {
-      draw_mesh_ids(vertices_.data(), mesh_->corners.data(), backs_.data(), backs_.size(), area, target);
+      // Some roundings of the largest key.
+      float largest = 0;
+      for (PlacedVertex const& v : vertices_) largest = std::max(largest, std::abs(v.values[0]));
+      draw_mesh_ids(vertices_.data(), mesh_->corners.data(), backs_.data(), backs_.size(), 4e-6F * largest, area,
+                    target);
       windows_are_current_ = false;
     }
     return;
@@ -157,15 +161,29 @@ bool TriangleSampler::nearly_seen(std::size_t triangle) const {
 }
 
 void TriangleSampler::find_in_picture(EyePoint const& eye) {
-  // Nearly edge-on, the rasteriser's rounding decides which side a pixel shows.
+  // Nearly edge-on, the rasteriser's rounding decides which side a pixel shows: there it is the side that the rest of
+  // the picture shows.
   constexpr float kEdgeOn = 0.02F;
-  float const behind = -kEdgeOn * farthest_point(eye);
+  float const edge_on = kEdgeOn * farthest_point(eye);
   std::uint32_t last = ~std::uint32_t{0};
+  std::size_t fronts = 0, backs = 0;
+  edge_on_.clear();
   for_each_pixel([&](int, int, std::uint32_t triangle) {
     if (triangle == last) return;
     last = triangle;
-    add(planes_->height(triangle, eye) < behind ? seen_.back : seen_.front, triangle);
+    float const height = planes_->height(triangle, eye);
+    if (height > edge_on) {
+      ++fronts;
+      add(seen_.front, triangle);
+    } else if (height < -edge_on) {
+      ++backs;
+      add(seen_.back, triangle);
+    } else {
+      edge_on_.push_back(triangle);
+    }
   });
+  mostly_backs_ = backs > fronts;
+  for (std::uint32_t const triangle : edge_on_) add(mostly_backs_ ? seen_.back : seen_.front, triangle);
 }
 
 void TriangleSampler::find_nearly_seen(EyePoint const& eye, double turn) {
@@ -175,17 +193,28 @@ void TriangleSampler::find_nearly_seen(EyePoint const& eye, double turn) {
   bool shows_backs = false;
   for (std::uint64_t const bits : seen_.back) shows_backs |= bits != 0;
   if (shows_backs) {
-    back_keys_.assign(keys_.size(), std::numeric_limits<float>::infinity());
+    // Beyond the rim is what turns the side that is seen mostly.
+    float const nothing = std::numeric_limits<float>::infinity();
+    back_keys_.assign(keys_.size(), nothing);
+    front_keys_ = keys_;
+    if (mostly_backs_) {
+      std::swap(front_keys_, back_keys_);
+      for_each_pixel([&](int x, int y, std::uint32_t) { back_keys_[pixel(x, y)] = nothing; });
+      for_each_pixel([&](int x, int y, std::uint32_t) { front_keys_[pixel(x, y)] = keys_[pixel(x, y)]; });
+    }
     for_each_pixel([&](int x, int y, std::uint32_t triangle) {
-      if ((seen_.back[triangle / 64] >> (triangle % 64) & 1) != 0) back_keys_[pixel(x, y)] = keys_[pixel(x, y)];
+      if ((seen_.back[triangle / 64] >> (triangle % 64) & 1) != 0)
+        std::swap(front_keys_[pixel(x, y)], back_keys_[pixel(x, y)]);
     });
     find_windows(back_keys_);
     find_passing();
     for (std::size_t i = 0; i < count; ++i) {
       if (planes_->height(i, eye) <= edge_on && nearly_seen(i)) add(seen_.back, i);
     }
+    find_windows(front_keys_);
+  } else if (!windows_are_current_) {
+    find_windows(keys_);
   }
-  if (!windows_are_current_) find_windows(keys_);
   find_passing();
   for (std::size_t i = 0; i < count; ++i) {
     if (planes_->height(i, eye) >= -edge_on && nearly_seen(i)) add(seen_.front, i);

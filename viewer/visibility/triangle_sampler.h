@@ -29,9 +29,10 @@ enum class Seen {
 /// no nearer than the vertex: no triangle is missed for being smaller than a pixel. Of triangles longer than eight
 /// pixels points between their vertices are asked too.
 ///
-/// Of a triangle that is nearly seen, the front counts where it turns to the camera or might turn to an eye near it
-/// (SampleCamera::turn). Beyond the rim of a closed object there are only backs that nobody sees: a back counts where
-/// the pixel that lets it through shows a back itself, of an open surface.
+/// Of a triangle that is nearly seen, a side counts that turns to the camera or might turn to an eye near it
+/// (SampleCamera::turn): a back where the pixel that lets it through shows a back, a front where it shows a front or
+/// nothing (of models turned inside out the other way round). So beyond the rim of a closed object, where there are
+/// only backs that nobody sees, none counts.
 class TriangleSampler {
  public:
   /// `bounds` hold the vertices; labels number the triangles. Mesh and planes must outlive the sampler.
@@ -71,11 +72,13 @@ class TriangleSampler {
   std::vector<PlacedVertex> vertices_;
   std::vector<float> keys_;
   std::vector<std::uint32_t> ids_;
-  std::vector<std::vector<float>> farthest_;  ///< least key within 1, 2, 4, ... pixels
-  bool windows_are_current_ = false;          ///< they are those of the picture
-  std::vector<std::uint32_t> backs_;          ///< triangles that turn their back and may be seen
-  std::vector<float> back_keys_;              ///< of pixels that show a back; elsewhere infinity
-  std::vector<std::uint8_t> passes_;          ///< a vertex
+  std::vector<std::vector<float>> farthest_;   ///< least key within 1, 2, 4, ... pixels
+  bool windows_are_current_ = false;           ///< they are those of the picture
+  std::vector<std::uint32_t> backs_;           ///< triangles that turn their back and may be seen
+  std::vector<float> back_keys_, front_keys_;  ///< infinity where a pixel shows no back; where it shows one
+  std::vector<std::uint32_t> edge_on_;         ///< scratch: triangles in the picture
+  bool mostly_backs_ = false;                  ///< the picture shows more backs than fronts: a model turned inside out
+  std::vector<std::uint8_t> passes_;           ///< a vertex
   SeenTriangles seen_;
 };
 
