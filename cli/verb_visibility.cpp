@@ -25,7 +25,7 @@ namespace {
 
 struct VisibilityArguments {
   fs::path model, output, cameras, path, glb, visibility;
-  std::string method = "patch", cut = "adaptive", winding = "automatic", box;
+  std::string method = "patch", cut = "adaptive", winding = "automatic", up = "y";
   std::vector<std::string> shells;
   std::vector<int> grid;
   std::size_t stretch = 10;
@@ -120,14 +120,17 @@ void render_orbit(VisibilityArguments const& arguments, Session& session) {
   fs::create_directories(arguments.output, error);
   if (error) throw Error(ErrorCode::io, arguments.output, "cannot create: " + error.message());
   session.report["frames"] = Json::array();
+  int const axis = arguments.up[0] - 'x';
+  Eigen::Vector3d const up = Eigen::Vector3d::Unit(axis), ahead = Eigen::Vector3d::Unit((axis + 1) % 3);
   std::size_t wrong = 0, pixels = 0;
   std::vector<IndexRange> ranges;
   std::vector<std::string> film;
   for (int i = 0; i < arguments.frames; ++i) {
     context.check_cancelled();
     double const angle = 2 * std::numbers::pi * i / arguments.frames;
-    Eigen::Vector3d const direction(std::cos(angle), std::sin(angle), 0.3);
-    SampleCamera const camera = ball_camera(field.center, field.radius, direction, arguments.distance, arguments.size);
+    Eigen::Vector3d const direction = std::cos(angle) * ahead + std::sin(angle) * up.cross(ahead) + 0.3 * up;
+    SampleCamera camera = ball_camera(field.center, field.radius, direction, arguments.distance, arguments.size);
+    camera.object_from_camera = look_at(camera.object_from_camera.translation(), field.center, up);
     if (!arguments.frozen || i == 0) {
       auto const selected = selector.select(camera.object_from_camera.translation());
       ranges.assign(selected.begin(), selected.end());
@@ -228,6 +231,8 @@ void add_visibility(CLI::App& app, Session& session) {
   part->add_option("--frames", arguments->frames, "Of a full turn")->check(CLI::Range(1, 100000));
   part->add_option("--size", arguments->size, "Of a picture, in pixels")->check(CLI::Range(16, 16384));
   part->add_option("--distance", arguments->distance, "Of the eye, in radii")->check(CLI::Range(1.01, 1e6));
+  part->add_option("--up", arguments->up, "The model's axis that points up: x, y, z")
+      ->check(CLI::IsMember({"x", "y", "z"}));
   part->add_flag("--check", arguments->check, "Draw the whole model, and in red the pixels that would be missed");
   part->add_flag("--frozen", arguments->frozen, "Keep what the first eye selected while the model turns");
   part->add_flag("--no-facing", arguments->no_facing, "Whole patches, also triangles that turn away");

@@ -1,6 +1,11 @@
 #pragma once
+#include <limits>
+#include <span>
+#include <vector>
+
 #include "mesh/polygon_model.h"
 #include "viewer/visibility/sample_sphere.h"
+#include "viewer/visibility/visibility_selector.h"
 
 namespace scanview::test {
 
@@ -51,6 +56,26 @@ inline PolygonModel body() {
   add_sphere(model.mesh, {-0.4F, 1.1F, 0.5F}, 0.4F, 3);
   add_box(model.mesh, {0.2F, -1.6F, -0.3F}, {0.9F, -0.9F, 0.4F}, 6);
   return model;
+}
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+inline VisibilityOptions quick() {
+  VisibilityOptions options;
+  options.samples = 258;
+  options.resolution = 256;
+  options.shells = {2, kInfinity};
+  options.patches = 60;
+  return options;
+}
+
+/// Whether the model's triangle is among the selected.
+inline std::vector<bool> selected(VisibilityField const& field, std::span<IndexRange const> ranges) {
+  std::vector<bool> is_drawn(field.patches.triangles.size());
+  for (IndexRange const& range : ranges) {
+    for (std::uint32_t i = range.first; i < range.first + range.count; ++i) is_drawn[field.patches.triangles[i]] = true;
+  }
+  return is_drawn;
 }
 
 }  // namespace scanview::test
