@@ -76,7 +76,7 @@ struct VisibilityOptions {
   int resolution = 512;  ///< of a sample's picture
   /// Triangles count as seen that an eye off the sample would see (TriangleSampler), as far off as this share of half
   /// the distance to the next sample. 0 leaves only the smaller than a pixel.
-  double widening = 0;
+  double widening = 0.15;
   Seen seen = Seen::nearly;  ///< in the papers: in_picture
   /// After each sample, neighbours of seen polygons that face the camera count as seen too, so many times (Meruvia
   /// 2001, section 3.1.1); −1: as long as there are any.

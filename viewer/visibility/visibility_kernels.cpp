@@ -21,15 +21,20 @@ void FacingBits(float const* x, float const* y, float const* z, float const* off
   std::size_t const lanes = hn::Lanes(d);
   auto const ex = hn::Set(d, eye[0]), ey = hn::Set(d, eye[1]), ez = hn::Set(d, eye[2]), ew = hn::Set(d, eye[3]);
   auto const margin = hn::Set(d, eye[4]);
-  for (std::size_t i = begin; i < end; i += lanes) {
-    auto const xy = hn::Add(hn::Mul(hn::LoadU(d, x + i), ex), hn::Mul(hn::LoadU(d, y + i), ey));
-    auto const z_offset = hn::Sub(hn::Mul(hn::LoadU(d, z + i), ez), hn::Mul(hn::LoadU(d, offset + i), ew));
-    auto const front = hn::And(hn::Gt(hn::Add(xy, z_offset), margin), hn::FirstN(d, end - i));
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, front, bytes);
-    std::uint64_t const mask = std::uint64_t{bytes[0]} | std::uint64_t{bytes[1]} << 8;
-    bits[i / 64] |= mask << (i % 64);
-    if (i % 64 + lanes > 64) bits[i / 64 + 1] |= mask >> (64 - i % 64);
+  for (std::size_t word = begin / 64; 64 * word < end; ++word) {
+    std::uint64_t front = 0;
+    for (std::size_t k = 0; k < 64; k += lanes) {
+      std::size_t const i = 64 * word + k;
+      if (i >= end) break;
+      auto const xy = hn::Add(hn::Mul(hn::LoadU(d, x + i), ex), hn::Mul(hn::LoadU(d, y + i), ey));
+      auto const z_offset = hn::Sub(hn::Mul(hn::LoadU(d, z + i), ez), hn::Mul(hn::LoadU(d, offset + i), ew));
+      std::uint8_t bytes[8] = {};
+      hn::StoreMaskBits(d, hn::Gt(hn::Add(xy, z_offset), margin), bytes);
+      front |= (std::uint64_t{bytes[0]} | std::uint64_t{bytes[1]} << 8) << k;
+    }
+    if (64 * word < begin) front &= ~std::uint64_t{0} << (begin % 64);
+    if (end < 64 * word + 64) front &= ~(~std::uint64_t{0} << (end % 64));
+    bits[word] |= front;
   }
 }
 

@@ -28,57 +28,15 @@ VisibilitySelector::VisibilitySelector(VisibilityField const& field, TriangleMes
     : field_(&field),
       facing_(facing),
       planes_(drawn, field.center, field.radius),
-      drawn_(drawn.triangles.size() / 64 + 2) {
-  find_cones(field, drawn);
-}
+      drawn_(drawn.triangles.size() / 64 + 2) {}
 
-void VisibilitySelector::find_cones(VisibilityField const& field, TriangleMesh const& drawn) {
-  cones_.resize(field.patches.count());
-  for (std::size_t p = 0; p < cones_.size(); ++p) {
-    PatchCone& cone = cones_[p];
-    std::size_t const begin = field.patches.begins[p], end = field.patches.begins[p + 1];
-    Eigen::Vector3f axis = Eigen::Vector3f::Zero();
-    Eigen::AlignedBox3d box;
-    for (std::size_t i = begin; i < end; ++i) {
-      axis += Eigen::Vector3f(planes_.x[i], planes_.y[i], planes_.z[i]);
-      for (int k = 0; k < 3; ++k)
-        box.extend(drawn.vertices[static_cast<std::size_t>(drawn.triangles[i][k])].cast<double>());
-    }
-    if (!(axis.norm() > 0)) continue;
-    axis.normalize();
-    float least = 1;
-    for (std::size_t i = begin; i < end; ++i)
-      least = std::min(least, axis.dot(Eigen::Vector3f(planes_.x[i], planes_.y[i], planes_.z[i])));
-    if (least <= 0) continue;
-    Eigen::Vector3f const middle = ((box.center() - field.center) / field.radius).cast<float>();
-    float const radius = static_cast<float>(0.5 * box.diagonal().norm() / field.radius);
-    cone = {axis.x(),   axis.y(),   axis.z(),   least,  std::sqrt(std::max(0.0F, 1 - least * least)),
-            middle.x(), middle.y(), middle.z(), radius, false};
+void VisibilitySelector::take(Run const& run, EyePoint const& eye) {
+  if (!facing_ || run.sides == 3) {
+    set_bits(drawn_, run.begin, run.end);
+  } else if (run.sides != 0) {
+    facing_bits(planes_.arrays(), {eye.x, eye.y, eye.z, eye.w}, run.sides == 1 ? 1.0F : -1.0F, run.begin, run.end,
+                drawn_.data());
   }
-}
-
-void VisibilitySelector::take_patch(std::size_t patch, bool front, bool back, EyePoint const& eye) {
-  std::size_t const begin = field_->patches.begins[patch], end = field_->patches.begins[patch + 1];
-  ++patches_;
-  if (!facing_ || (front && back)) {
-    set_bits(drawn_, begin, end);
-    return;
-  }
-  PatchCone const& cone = cones_[patch];
-  if (!cone.is_wide) {
-    // n · (eye − p) for all normals n of the cone and all points p of the ball: its bounds.
-    float const vx = eye.x - cone.cx * eye.w, vy = eye.y - cone.cy * eye.w, vz = eye.z - cone.cz * eye.w;
-    float const to_axis = vx * cone.x + vy * cone.y + vz * cone.z;
-    float const across = std::sqrt(std::max(0.0F, vx * vx + vy * vy + vz * vz - to_axis * to_axis));
-    float const along = front ? to_axis : -to_axis;
-    float const slack = cone.radius * eye.w + 1e-5F;
-    if (along * cone.cosine - across * cone.sine > slack) {
-      set_bits(drawn_, begin, end);
-      return;
-    }
-    if (along < 0 && along * cone.cosine + across * cone.sine < -slack) return;
-  }
-  facing_bits(planes_.arrays(), {eye.x, eye.y, eye.z, eye.w}, front ? 1.0F : -1.0F, begin, end, drawn_.data());
 }
 
 void VisibilitySelector::collect_ranges() {
@@ -120,14 +78,22 @@ std::span<IndexRange const> VisibilitySelector::answer(VisibilityField::Query co
     return kept.ranges;
   }
   std::fill(drawn_.begin(), drawn_.end(), 0);
+  Run run;
   field_->rows.visit_union({query.rows, query.count}, [&](std::size_t word, std::uint64_t bits) {
     while (bits != 0) {
-      auto const side = static_cast<std::size_t>(std::countr_zero(bits)) & ~std::size_t{1};
-      std::uint64_t const both = bits >> side & 3;
-      take_patch(32 * word + side / 2, (both & 1) != 0, (both & 2) != 0, eye);
-      bits &= ~(std::uint64_t{3} << side);
+      auto const shift = static_cast<std::size_t>(std::countr_zero(bits)) & ~std::size_t{1};
+      std::uint64_t const sides = bits >> shift & 3;
+      bits &= ~(std::uint64_t{3} << shift);
+      std::size_t const patch = 32 * word + shift / 2;
+      ++patches_;
+      if (run.end != field_->patches.begins[patch] || (facing_ && run.sides != sides)) {
+        take(run, eye);
+        run = {field_->patches.begins[patch], 0, sides};
+      }
+      run.end = field_->patches.begins[patch + 1];
     }
   });
+  take(run, eye);
   collect_ranges();
   if (facing_) return ranges_;
   if (kept_.size() <= query.cell) kept_.resize(query.cell + 1);

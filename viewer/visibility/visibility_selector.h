@@ -37,21 +37,18 @@ class VisibilitySelector {
   int tests() const { return tests_; }                  ///< to find the face
 
  private:
-  /// How the triangles of a patch face: their normals lie around an axis.
-  struct PatchCone {
-    float x = 0, y = 0, z = 0, cosine = 1, sine = 0;  ///< axis and the widest angle of a normal from it
-    float cx = 0, cy = 0, cz = 0, radius = 0;         ///< ball around the triangles
-    bool is_wide = true;  ///< half a sphere of normals or more: nothing is known of them all
-  };
-  void find_cones(VisibilityField const& field, TriangleMesh const& drawn);
   std::span<IndexRange const> answer(VisibilityField::Query const& query, EyePoint const& eye);
-  void take_patch(std::size_t patch, bool front, bool back, EyePoint const& eye);
+  /// Patches in a row of which the same sides are seen: bit 0 the fronts, bit 1 the backs.
+  struct Run {
+    std::size_t begin = 0, end = 0;  ///< triangles
+    std::uint64_t sides = 0;
+  };
+  void take(Run const& run, EyePoint const& eye);
   void collect_ranges();
 
   VisibilityField const* field_;
   bool facing_;
   TrianglePlanes planes_;
-  std::vector<PatchCone> cones_;
   std::vector<std::uint64_t> drawn_;  ///< a bit a triangle
   std::vector<IndexRange> ranges_;
   struct Kept {
