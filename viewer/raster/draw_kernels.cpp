@@ -415,8 +415,9 @@ bool PlaceVertices(VertexArrays const& vertices, ScreenTransform const& transfor
   return true;
 }
 
-/// DrawTriangle of one no wider than a vector, whose edge functions fit 32 bits when counted from its first pixel.
-HWY_INLINE void DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, PlacedVertex const& c, std::uint32_t label,
+/// Whether a pixel was drawn. DrawTriangle of one no wider than a vector, whose edge functions fit 32 bits when counted
+/// from its first pixel.
+HWY_INLINE bool DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, PlacedVertex const& c, std::uint32_t label,
                             std::int32_t area2, int left, int top, int bottom, IdTarget const& target) {
   Floats const d;
   Ints const di;
@@ -449,6 +450,7 @@ HWY_INLINE void DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, Placed
   auto const along = hn::Mul(hn::Set(d, slope_x), hn::Iota(d, 0));
   std::size_t at =
       static_cast<std::size_t>(top) * static_cast<std::size_t>(target.stride) + static_cast<std::size_t>(left);
+  bool drew = false;
   for (int y = top; y <= bottom; ++y) {
     auto const plane = hn::Add(hn::Set(d, at_left + slope_y * (static_cast<float>(y) - a_y)), along);
     auto const key = hn::Min(hn::Max(plane, hn::Set(d, least)), hn::Set(d, most));
@@ -456,6 +458,7 @@ HWY_INLINE void DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, Placed
     auto const before = hn::LoadU(d, target.key + at);
     auto const mask = hn::And(hn::RebindMask(d, covered), hn::Gt(key, before));
     if (!hn::AllFalse(d, mask)) {
+      drew = true;
       hn::StoreU(hn::IfThenElse(mask, key, before), d, target.key + at);
       hn::StoreU(hn::IfThenElse(hn::RebindMask(du, mask), hn::Set(du, label), hn::LoadU(du, target.id + at)), du,
                  target.id + at);
@@ -465,15 +468,18 @@ HWY_INLINE void DrawSmallId(PlacedVertex const& a, PlacedVertex const& b, Placed
     e2 = hn::Add(e2, hn::Set(di, step_y[2]));
     at += static_cast<std::size_t>(target.stride);
   }
+  return drew;
 }
 
+/// Whether a pixel may have been drawn.
 template <bool kListed>
-HWY_INLINE void DrawMesh(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+HWY_INLINE bool DrawMesh(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
                          std::size_t count, float behind, TileArea const& area, IdTarget const& target) {
   Floats const d;
   int const lanes = static_cast<int>(hn::Lanes(d));
   IdWriter const writer(target);
   PlacedVertex moved[3];
+  bool drew = false;
   for (std::size_t i = 0; i < count; ++i) {
     std::uint32_t const triangle = kListed ? list[i] : static_cast<std::uint32_t>(i);
     PlacedVertex const& a = vertices[corners[3 * std::size_t{triangle}]];
@@ -494,12 +500,14 @@ HWY_INLINE void DrawMesh(PlacedVertex const* vertices, std::int32_t const* corne
                        &third = kListed ? moved[2] : *c;
     if (right - left < lanes && bottom - top < 64 && left >= area.left && right < area.right && top >= area.top &&
         bottom < area.bottom) {
-      DrawSmallId(first, second, third, triangle, static_cast<std::int32_t>(area2 < 0 ? -area2 : area2), left, top,
-                  bottom, target);
+      drew |= DrawSmallId(first, second, third, triangle, static_cast<std::int32_t>(area2 < 0 ? -area2 : area2), left,
+                          top, bottom, target);
     } else {
       DrawTriangle(first, second, third, triangle, area, writer);
+      drew = true;
     }
   }
+  return drew;
 }
 
 void DrawMeshFronts(PlacedVertex const* vertices, std::int32_t const* corners, std::size_t count, TileArea const& area,
@@ -507,9 +515,9 @@ void DrawMeshFronts(PlacedVertex const* vertices, std::int32_t const* corners, s
   DrawMesh<false>(vertices, corners, nullptr, count, 0, area, target);
 }
 
-void DrawMeshIds(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+bool DrawMeshIds(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
                  std::size_t count, float behind, TileArea const& area, IdTarget const& target) {
-  DrawMesh<true>(vertices, corners, list, count, behind, area, target);
+  return DrawMesh<true>(vertices, corners, list, count, behind, area, target);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -550,9 +558,9 @@ void draw_mesh_fronts(PlacedVertex const* vertices, std::int32_t const* corners,
   HWY_DYNAMIC_DISPATCH(DrawMeshFronts)(vertices, corners, count, area, target);
 }
 
-void draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+bool draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
                    std::size_t count, float behind, TileArea const& area, IdTarget const& target) {
-  HWY_DYNAMIC_DISPATCH(DrawMeshIds)(vertices, corners, list, count, behind, area, target);
+  return HWY_DYNAMIC_DISPATCH(DrawMeshIds)(vertices, corners, list, count, behind, area, target);
 }
 
 std::vector<char const*> kernel_targets() {

@@ -25,8 +25,8 @@ bool place_vertices(VertexArrays const& vertices, ScreenTransform const& transfo
 void draw_mesh_fronts(PlacedVertex const* vertices, std::int32_t const* corners, std::size_t count,
                       TileArea const& area, IdTarget const& target);
 /// The same for the listed triangles, whichever side they turn, their keys less by `behind`: on the outline, where a
-/// front and a back meet, rounding must not decide.
-void draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
+/// front and a back meet, rounding must not decide. False where no pixel changed.
+bool draw_mesh_ids(PlacedVertex const* vertices, std::int32_t const* corners, std::uint32_t const* list,
                    std::size_t count, float behind, TileArea const& area, IdTarget const& target);
 
 /// A layer of a tile for the compositor.

@@ -15,7 +15,7 @@ namespace {
 
 /// Beside a row, so that vectors may be read beyond it.
 constexpr int kPadding = 16;
-/// The widest window has a radius of 2^(static_cast<int>(farthest_.size()) - 1) pixels: more parallax than that is seen
+/// The widest window has a radius of 2^(static_cast<int>(windows_) - 1) pixels: more parallax than that is seen
 /// by another sample.
 constexpr std::size_t kWindows = 6;
 /// Without parallax windows only tell which small triangles behind are hidden.
@@ -41,7 +41,7 @@ void TriangleSampler::draw(SampleCamera const& sample) {
   stride_ = width_ + kPadding;
   auto const pixels = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_);
   keys_.assign(pixels, kNothing);
-  windows_are_current_ = false;
+  current_windows_ = 0;
   ids_.resize(pixels);
   parallax_ = static_cast<float>(std::max(camera.fx(), camera.fy()) * sample.movement);
   Eigen::Isometry3d const camera_from_object = sample.object_from_camera.inverse();
@@ -56,16 +56,14 @@ void TriangleSampler::draw(SampleCamera const& sample) {
     TileArea const area{0, 0, width_, height_};
     IdTarget const target{keys_.data(), ids_.data(), stride_};
     draw_mesh_fronts(vertices_.data(), mesh_->corners.data(), mesh_->corners.size() / 3, area, target);
-    find_windows(keys_);
+    find_windows(keys_, kStillWindows);
     list_unhidden_backs();
-    if (!backs_.empty()) {
-      // Some roundings of the largest key.
-      float largest = 0;
-      for (PlacedVertex const& v : vertices_) largest = std::max(largest, std::abs(v.values[0]));
-      draw_mesh_ids(vertices_.data(), mesh_->corners.data(), backs_.data(), backs_.size(), 4e-6F * largest, area,
-                    target);
-      windows_are_current_ = false;
-    }
+    // Some roundings of the largest key.
+    float largest = 0;
+    for (PlacedVertex const& v : vertices_) largest = std::max(largest, std::abs(v.values[0]));
+    if (draw_mesh_ids(vertices_.data(), mesh_->corners.data(), backs_.data(), backs_.size(), 4e-6F * largest, area,
+                      target))
+      current_windows_ = 0;
     return;
   }
   // A camera inside the model, or a picture too large to be drawn whole.
@@ -82,15 +80,17 @@ void TriangleSampler::draw(SampleCamera const& sample) {
   }
 }
 
-void TriangleSampler::find_windows(std::vector<float> const& keys) {
-  farthest_.resize(parallax_ > 0 ? kWindows : kStillWindows);
-  for (auto& window : farthest_) window.resize(keys.size());
+void TriangleSampler::find_windows(std::vector<float> const& keys, std::size_t count) {
+  farthest_.resize(kWindows);
   PictureSize const size{width_, height_, stride_};
-  window_minimum(keys.data(), size, 1, true, farthest_[0].data());
-  // Four windows of half the radius make one.
-  for (std::size_t k = 1; k < farthest_.size(); ++k)
-    window_minimum(farthest_[k - 1].data(), size, 1 << (k - 1), false, farthest_[k].data());
-  windows_are_current_ = &keys == &keys_;
+  for (std::size_t k = &keys == &keys_ ? current_windows_ : 0; k < count; ++k) {
+    farthest_[k].resize(keys.size());
+    // Four windows of half the radius make one.
+    float const* const from = k == 0 ? keys.data() : farthest_[k - 1].data();
+    window_minimum(from, size, k == 0 ? 1 : 1 << (k - 1), k == 0, farthest_[k].data());
+  }
+  windows_ = count;
+  current_windows_ = &keys == &keys_ ? count : 0;
 }
 
 void TriangleSampler::list_unhidden_backs() {
@@ -107,7 +107,7 @@ void TriangleSampler::list_unhidden_backs() {
                                         std::max(std::abs(b.y - a.y), std::abs(c.y - a.y)));
     auto const k = static_cast<std::size_t>(std::bit_width(static_cast<std::uint32_t>(reach + 255) >> 8));
     float const nearest = std::max(std::max(a.values[0], b.values[0]), c.values[0]);
-    if (k >= farthest_.size() || farthest_[k][nearest_pixel(a.x, a.y)] <= nearest)
+    if (k >= windows_ || farthest_[k][nearest_pixel(a.x, a.y)] <= nearest)
       backs_.push_back(static_cast<std::uint32_t>(i));
   }
 }
@@ -130,7 +130,7 @@ bool TriangleSampler::passes(std::int32_t x, std::int32_t y, float key) const {
   float const shift = parallax_ * (keys_[at] - key);
   if (!(shift > 1)) return false;
   int const k = std::min(static_cast<int>(std::bit_width(static_cast<std::uint32_t>(std::min(shift, 1e6F) - 1e-6F))),
-                         static_cast<int>(farthest_.size()) - 1);
+                         static_cast<int>(windows_) - 1);
   return farthest_[static_cast<std::size_t>(k)][at] <= key;
 }
 
@@ -188,7 +188,7 @@ void TriangleSampler::find_in_picture(EyePoint const& eye) {
 
 void TriangleSampler::find_nearly_seen(EyePoint const& eye, double turn) {
   float const edge_on = static_cast<float>(std::sin(std::min(turn, 1.5))) * farthest_point(eye);
-  std::size_t const count = mesh_->corners.size() / 3;
+  std::size_t const count = mesh_->corners.size() / 3, wanted = parallax_ > 0 ? kWindows : 1;
   // Before fronts are added to: what shows a back in the picture.
   bool shows_backs = false;
   for (std::uint64_t const bits : seen_.back) shows_backs |= bits != 0;
@@ -206,14 +206,14 @@ void TriangleSampler::find_nearly_seen(EyePoint const& eye, double turn) {
       if ((seen_.back[triangle / 64] >> (triangle % 64) & 1) != 0)
         std::swap(front_keys_[pixel(x, y)], back_keys_[pixel(x, y)]);
     });
-    find_windows(back_keys_);
+    find_windows(back_keys_, wanted);
     find_passing();
     for (std::size_t i = 0; i < count; ++i) {
       if (planes_->height(i, eye) <= edge_on && nearly_seen(i)) add(seen_.back, i);
     }
-    find_windows(front_keys_);
-  } else if (!windows_are_current_) {
-    find_windows(keys_);
+    find_windows(front_keys_, wanted);
+  } else {
+    find_windows(keys_, wanted);
   }
   find_passing();
   for (std::size_t i = 0; i < count; ++i) {

@@ -57,7 +57,7 @@ class TriangleSampler {
   void draw(SampleCamera const& camera);
   void find_in_picture(EyePoint const& eye);
   void find_nearly_seen(EyePoint const& eye, double turn);
-  void find_windows(std::vector<float> const& keys);
+  void find_windows(std::vector<float> const& keys, std::size_t count);
   void list_unhidden_backs();
   void find_passing();
   std::size_t nearest_pixel(std::int32_t x, std::int32_t y) const;
@@ -73,7 +73,8 @@ class TriangleSampler {
   std::vector<float> keys_;
   std::vector<std::uint32_t> ids_;
   std::vector<std::vector<float>> farthest_;   ///< least key within 1, 2, 4, ... pixels
-  bool windows_are_current_ = false;           ///< they are those of the picture
+  std::size_t windows_ = 0;                    ///< how many of them there are
+  std::size_t current_windows_ = 0;            ///< how many are those of the picture
   std::vector<std::uint32_t> backs_;           ///< triangles that turn their back and may be seen
   std::vector<float> back_keys_, front_keys_;  ///< infinity where a pixel shows no back; where it shows one
   std::vector<std::uint32_t> edge_on_;         ///< scratch: triangles in the picture
