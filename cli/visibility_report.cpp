@@ -9,6 +9,7 @@
 #include "base/image_file.h"
 #include "synth/visible_triangles.h"
 #include "viewer/visibility/selection_drawer.h"
+#include "viewer/visibility/smallest_samples.h"
 #include "viewer/visibility/visibility_check.h"
 #include "viewer/visibility/visibility_file.h"
 
@@ -21,7 +22,7 @@ constexpr double kNearest = 2, kFarthest = 5;
 struct Measured {
   VisibilityFigures figures;
   VisibilityTimes times;
-  std::size_t patches = 0;
+  std::size_t patches = 0, samples = 0, enough = 0;
   double bits_a_polygon = 0, select_us = 0, frame_ms = 0;
 };
 
@@ -37,6 +38,8 @@ Measured measure(PolygonModel const& model, VisibilityOptions const& options, bo
   auto const eyes = unseen_eyes(field, eye_count, kNearest, farthest, context.seed);
   result.figures = check_visibility(field, drawn, model.polygons, facing, eyes, kPixels, context);
   result.patches = field.patches.count();
+  result.samples = field.rows.rows();
+  result.enough = smallest_samples(field.rows).size();
   result.bits_a_polygon = 8.0 * static_cast<double>(format_visibility(field, model.mesh).size()) /
                           static_cast<double>(model.polygon_count());
   VisibilitySelector selector(field, drawn, facing);
@@ -141,7 +144,8 @@ VisibilityReport visibility_report(PolygonModel const& model, std::string const&
   Limit const limit = exact_limit(model, std::min<std::size_t>(eyes, 24), context);
   std::vector<std::vector<std::string>> table{
       {"", "patches", "culled %", "of limit", "wrong", "ms", "faster", "select us", "ranges", "bits", "build s"}};
-  table.push_back(row("as asked", measure(model, options, true, eyes, kFarthest, context), limit));
+  Measured const asked = measure(model, options, true, eyes, kFarthest, context);
+  table.push_back(row("as asked", asked, limit));
   table.push_back({fmt::format("exact limit ({} rays a polygon)", kRaysAPolygon), "",
                    fmt::format("{:.1f}", 100 * limit.culling_rate), "1", "0",
                    fmt::format("{:.2f}", limit.exact_frame_ms),
@@ -191,7 +195,8 @@ VisibilityReport visibility_report(PolygonModel const& model, std::string const&
   }
 
   VisibilityReport report;
-  report.text = as_text(table);
+  std::string const enough = fmt::format("{} of the {} samples see all that all see.", asked.enough, asked.samples);
+  report.text = as_text(table) + enough + '\n';
   PlotOptions plot{"samples", "culling rate %", true};
   auto const with_labels = [&](std::string const& x, std::string const& y, bool log_y = false) {
     plot.x_label = x;
@@ -199,14 +204,17 @@ VisibilityReport visibility_report(PolygonModel const& model, std::string const&
     plot.log_y = log_y;
     return plot;
   };
-  std::string html = html_table(table);
+  std::string html = html_table(table) + "<p>" + enough + "</p>";
   html += html_row({svg_plot({id_rate, patch_rate, limit_rate}, with_labels("samples", "culling rate %")),
                     svg_plot({id_frames, patch_frames}, with_labels("samples", "frames a second, CPU back end")),
                     svg_plot({id_wrong, patch_wrong}, with_labels("samples", "wrong pixels of a million"))});
   html += html_row({svg_plot({by_patches}, with_labels("patches", "culling rate %")),
                     svg_plot({frames_by_patches}, with_labels("patches", "frames a second, CPU back end"))});
   report.section = {"visibility", name, html};
-  report.figures = {{"polygons", model.polygon_count()}, {"limit", limit.culling_rate}, {"table", table}};
+  report.figures = {{"polygons", model.polygon_count()},
+                    {"limit", limit.culling_rate},
+                    {"samples_enough", asked.enough},
+                    {"table", table}};
   return report;
 }
 

@@ -13,6 +13,7 @@
 #include "viewer/raster/id_buffer.h"
 #include "viewer/raster/kernels.h"
 #include "viewer/visibility/hidden_cells.h"
+#include "viewer/visibility/smallest_samples.h"
 #include "viewer/visibility/visibility_check.h"
 #include "viewer/visibility/visibility_file.h"
 #include "visibility_models.h"
@@ -326,6 +327,23 @@ TEST(Visibility, APersonsCamerasCoverTheirHalfSpaceAndSaySo) {
   EXPECT_FALSE(selector.is_whole());
   selector.select(field.center + field.radius * Eigen::Vector3d(0.4, 0.3, -3));
   EXPECT_TRUE(selector.is_whole());
+}
+
+TEST(SmallestSamples, SeeAllThatAnySampleSees) {
+  BitRows rows(4, 6);
+  for (auto const& [row, column] : {std::pair{0, 0}, {0, 1}, {1, 2}, {2, 1}, {2, 2}, {2, 3}, {2, 4}, {3, 3}})
+    rows.set(static_cast<std::size_t>(row), static_cast<std::size_t>(column));
+  EXPECT_EQ(smallest_samples(rows), (std::vector<std::size_t>{2, 0})) << "nobody sees column 5";
+  Context context;
+  VisibilityField const field = build_visibility(test::body(), quick(), context);
+  auto const chosen = smallest_samples(field.rows);
+  EXPECT_LT(chosen.size(), 40U);
+  for (std::size_t column = 0; column < field.rows.columns(); ++column) {
+    auto const sees = [&](std::size_t row) { return field.rows.test(row, column); };
+    bool anyone = false;
+    for (std::size_t row = 0; row < field.rows.rows(); ++row) anyone |= sees(row);
+    EXPECT_EQ(std::any_of(chosen.begin(), chosen.end(), sees), anyone);
+  }
 }
 
 TEST(Visibility, ARecordedPathIsReplayed) {
