@@ -24,7 +24,8 @@ enum class PatchCut { even, adaptive };
 /// Eyes anywhere around the model: samples on shells of directions. A row for each shell's each direction.
 struct SphereLookup {
   SampleSphere sphere = SampleSphere::octahedron(0);
-  /// Distances from the centre in radii, ascending; infinity: orthographic. Eyes nearer than the first see everything.
+  /// Distances from the centre in radii, ascending; infinity: orthographic. Eyes nearer than the first see everything;
+  /// of those farther than the last its samples decide alone.
   std::vector<double> shells;
   /// OR the three samples around the eye, or also the three opposite to their edges (Meruvia 2001, section 3.2.1).
   bool opposite = false;
@@ -92,7 +93,7 @@ struct VisibilityOptions {
   void validate() const;
 };
 
-/// How the time went, in seconds of all threads' wall clock.
+/// How the time went, in seconds.
 struct VisibilityTimes {
   double patches = 0, sampling = 0;
   std::size_t pictures = 0;
