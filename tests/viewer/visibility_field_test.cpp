@@ -214,6 +214,21 @@ TEST(Visibility, NearerThanTheSamplesEverythingIsDrawn) {
   EXPECT_FALSE(selector.is_whole());
 }
 
+TEST(Visibility, FromAfarSelectsWhatFacesTheDirection) {
+  PolygonModel const model = test::body();
+  Context context;
+  VisibilityField const field = build_visibility(model, quick(), context);
+  TriangleMesh const drawn = drawn_mesh(model.mesh, field.patches);
+  VisibilitySelector selector(field, drawn);
+  for (Eigen::Vector3d const& direction : {Eigen::Vector3d(0.2, 0.5, 1), Eigen::Vector3d(-1, 0.1, 0.3)}) {
+    auto const ranges = selector.select_from_afar(direction);
+    EXPECT_FALSE(selector.is_whole());
+    EXPECT_LT(selector.triangles(), 0.6 * static_cast<double>(drawn.triangles.size()));
+    EXPECT_LE(missed_pixels(drawn, ranges, ball_camera(field.center, field.radius, direction, kInfinity, 512)).count,
+              2U);
+  }
+}
+
 TEST(Visibility, InsideOutModelsShowTheirBacks) {
   PolygonModel model = test::body();
   Context context;

@@ -33,8 +33,11 @@ class Sampling {
         mesh_(drawn_mesh(model.mesh, patches_)),
         planes_(mesh_, center, radius) {
     for (auto const& vertex : mesh_.vertices) bounds_.extend(vertex.cast<double>());
-    has_transparent_ = std::find_if(model.transparent.begin(), model.transparent.end(),
-                                    [](auto t) { return t != 0; }) != model.transparent.end();
+    has_transparent_ = std::find(model.transparent.begin(), model.transparent.end(), 1) != model.transparent.end();
+    for (std::size_t p = 0; p < patches_.count(); ++p)
+      triangles_of_node_.push_back(patches_.begins[p + 1] - patches_.begins[p]);
+    for (auto const& [first, second] : hierarchy.fusions)
+      triangles_of_node_.push_back(triangles_of_node_[first] + triangles_of_node_[second]);
     std::vector<std::int32_t> patch(mesh_.triangles.size());
     for (std::size_t p = 0; p < patches_.count(); ++p)
       std::fill(patch.begin() + patches_.begins[p], patch.begin() + patches_.begins[p + 1],
@@ -107,13 +110,11 @@ class Sampling {
     std::fill(worker.in_front.begin(), worker.in_front.end(), 0);
     facing_bits(planes_.arrays(), {eye.x, eye.y, eye.z, eye.w}, 1, 0, mesh_.triangles.size(), worker.in_front.data());
     std::size_t const fine = patches_.count();
-    auto const pay = [&](std::size_t node, std::uint32_t triangles) {
+    auto const pay = [&](std::size_t node) {
       std::uint32_t const fronts = worker.fronts[node];
       if ((worker.is_seen[node] & 1) != 0) worker.cost[node] += fronts;
-      if ((worker.is_seen[node] & 2) != 0) worker.cost[node] += triangles - fronts;
+      if ((worker.is_seen[node] & 2) != 0) worker.cost[node] += triangles_of_node_[node] - fronts;
     };
-    std::vector<std::uint32_t>& count = triangles_of_node_.local();
-    count.resize(worker.fronts.size());
     for (std::size_t p = 0; p < fine; ++p) {
       std::size_t const begin = patches_.begins[p], end = patches_.begins[p + 1];
       std::uint32_t fronts = 0;
@@ -123,16 +124,14 @@ class Sampling {
         fronts += static_cast<std::uint32_t>(std::popcount(bits));
       }
       worker.fronts[p] = fronts;
-      count[p] = static_cast<std::uint32_t>(end - begin);
-      pay(p, count[p]);
+      pay(p);
     }
     for (std::size_t j = 0; j < hierarchy_.fusions.size(); ++j) {
       auto const& [first, second] = hierarchy_.fusions[j];
       std::size_t const node = fine + j;
       worker.is_seen[node] = worker.is_seen[first] | worker.is_seen[second];
       worker.fronts[node] = worker.fronts[first] + worker.fronts[second];
-      count[node] = count[first] + count[second];
-      pay(node, count[node]);
+      pay(node);
     }
   }
 
@@ -146,7 +145,7 @@ class Sampling {
   std::vector<std::int32_t> patch_of_;
   std::vector<std::vector<std::uint32_t>> neighbors_;
   bool has_transparent_ = false;
-  mutable tbb::enumerable_thread_specific<std::vector<std::uint32_t>> triangles_of_node_;
+  std::vector<std::uint32_t> triangles_of_node_;
 };
 
 }  // namespace

@@ -15,8 +15,7 @@ namespace {
 
 /// Beside a row, so that vectors may be read beyond it.
 constexpr int kPadding = 16;
-/// The widest window has a radius of 2^(static_cast<int>(windows_) - 1) pixels: more parallax than that is seen
-/// by another sample.
+/// The widest window has a radius of 2^(kWindows - 1) pixels: more parallax than that is seen by another sample.
 constexpr std::size_t kWindows = 6;
 /// Without parallax windows only tell which small triangles behind are hidden.
 constexpr std::size_t kStillWindows = 4;
@@ -164,13 +163,15 @@ void TriangleSampler::find_in_picture(EyePoint const& eye) {
   // Nearly edge-on, the rasteriser's rounding decides which side a pixel shows: there it is the side that the rest of
   // the picture shows.
   constexpr float kEdgeOn = 0.02F;
-  float const edge_on = kEdgeOn * farthest_point(eye);
+  // A height is a cosine times the distance: of a wall right before the eye both are small.
+  float const radius = static_cast<float>(planes_->radius);
   std::uint32_t last = ~std::uint32_t{0};
   std::size_t fronts = 0, backs = 0;
   edge_on_.clear();
-  for_each_pixel([&](int, int, std::uint32_t triangle) {
+  for_each_pixel([&](int x, int y, std::uint32_t triangle) {
     if (triangle == last) return;
     last = triangle;
+    float const edge_on = kEdgeOn * (eye.w > 0 ? 1 / (keys_[pixel(x, y)] * radius) : 1);
     float const height = planes_->height(triangle, eye);
     if (height > edge_on) {
       ++fronts;

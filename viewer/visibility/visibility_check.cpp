@@ -108,7 +108,6 @@ VisibilityFigures check_visibility(VisibilityField const& field, TriangleMesh co
     figures.ranges += each[e].ranges / n;
     figures.patches += each[e].patches / n;
     figures.wrong_pixels += each[e].wrong;
-    if (each[e].wrong > each[figures.worst_eye].wrong) figures.worst_eye = e;
   }
   figures.pixels = eyes.size() * static_cast<std::size_t>(resolution) * static_cast<std::size_t>(resolution);
   return figures;

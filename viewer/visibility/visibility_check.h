@@ -20,7 +20,6 @@ struct VisibilityFigures {
   double visible = 0;            ///< share of polygons with a pixel in the whole model's picture, mean
   std::size_t wrong_pixels = 0;  ///< that show something else than they would with the whole model
   std::size_t pixels = 0;        ///< of all pictures
-  std::size_t worst_eye = 0;     ///< with the most wrong pixels
   double ranges = 0;             ///< mean
   double patches = 0;            ///< seen, mean
 };
