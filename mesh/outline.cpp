@@ -46,6 +46,15 @@ class CrackGraph {
     return horizontal_(j, i) + vertical_(j, i) + (i > 0 ? horizontal_(j, i - 1) : 0) +
            (j > 0 ? vertical_(j - 1, i) : 0);
   }
+  /// Whether cracks meet here, or the picture's frame turns or is left: it is to be followed exactly, for what another
+  /// picture shows may begin there.
+  bool is_node(Eigen::Vector2i corner) const {
+    int const count = degree(corner);
+    bool const across = corner.x() == 0 || corner.x() == width_, down = corner.y() == 0 || corner.y() == height_;
+    if (count != 2 || !(across || down)) return count != 2;
+    bool const along_x = has(corner, 0) && has(corner, 2), along_y = has(corner, 1) && has(corner, 3);
+    return !(down && along_x) && !(across && along_y);
+  }
   /// The pixels beside the crack that leads from `corner` in `direction`.
   static Gate gate(Eigen::Vector2i corner, int direction) {
     int const i = corner.x(), j = corner.y();
@@ -77,7 +86,7 @@ class CrackGraph {
   cv::Mat1b horizontal_, vertical_;
 };
 
-/// Cracks from corner to corner: from one corner where not exactly two meet to the next, or all around.
+/// Cracks from node to node (CrackGraph::is_node), or all around.
 struct Chain {
   std::vector<Eigen::Vector2i> corners;  ///< one more than gates
   std::vector<Gate> gates;
@@ -100,14 +109,14 @@ Chain follow(CrackGraph& graph, cv::Mat1b const& is_node, Eigen::Vector2i corner
   }
 }
 
+/// Takes the graph apart, whose copies share their cracks.
 std::vector<Chain> find_chains(CrackGraph graph) {
   cv::Mat1b is_node(graph.height() + 1, graph.width() + 1);
   std::vector<Eigen::Vector2i> corners;  // where cracks meet
   for (int j = 0; j <= graph.height(); ++j)
     for (int i = 0; i <= graph.width(); ++i) {
-      int const degree = graph.degree({i, j});
-      is_node(j, i) = degree != 2;
-      if (degree > 0) corners.emplace_back(i, j);
+      is_node(j, i) = graph.is_node({i, j});
+      if (graph.degree({i, j}) > 0) corners.emplace_back(i, j);
     }
   std::vector<Chain> chains;
   for (int nodes_first = 1; nodes_first >= 0; --nodes_first)
@@ -132,14 +141,17 @@ struct ChainPlace {
 
 class ChainSimplifier {
  public:
-  /// `free_loop`: a closed chain without a node on it, which may begin anywhere.
-  ChainSimplifier(Chain const& chain, bool free_loop)
-      : chain_(chain), count_(int(chain.gates.size())), free_loop_(free_loop) {}
+  /// between_nodes: its ends stay. free_loop: closed without a node on it, so it may begin anywhere. slit: open, and
+  /// nothing else meets either end.
+  enum class Kind { between_nodes, free_loop, slit };
+  ChainSimplifier(Chain const& chain, Kind kind) : chain_(chain), count_(int(chain.gates.size())), kind_(kind) {}
 
   /// The polyline's vertices, the first and the last included; gates go on counting after a closed chain's end.
   std::vector<ChainPlace> run() const {
-    std::vector<ChainPlace> const best = from({0, 0});
-    if (!free_loop_) return best;
+    std::vector<ChainPlace> best = from({0, 0});
+    // At a slit's ends both its sides have one vertex: without another between them nothing would part the sides.
+    if (kind_ == Kind::slit && best.size() == 2) best.insert(best.begin() + 1, between(best[0], best[1]));
+    if (kind_ != Kind::free_loop) return best;
     std::vector<ChainPlace> const other = from(best[1]);
     return other.size() < best.size() ? other : best;
   }
@@ -216,6 +228,21 @@ class ChainSimplifier {
     }
   }
 
+  /// The place near the middle of a straight piece that bends it least.
+  ChainPlace between(ChainPlace const& from, ChainPlace const& to) const {
+    int const middle = (from.gate + to.gate) / 2;
+    ChainPlace best{middle, 4};
+    double least = INFINITY;
+    for (int eighths = 1; eighths < 8; ++eighths) {
+      ChainPlace const place{middle, eighths};
+      double const sum = deviation(from, place) + deviation(place, to);
+      if (sum >= least) continue;
+      least = sum;
+      best = place;
+    }
+    return best;
+  }
+
   /// How far a straight line is from the middles of the gates it passes, squared and summed; infinite where it fails
   /// one.
   double deviation(ChainPlace const& from, ChainPlace const& to) const {
@@ -254,7 +281,7 @@ class ChainSimplifier {
 
   Chain const& chain_;
   int count_;
-  bool free_loop_;
+  Kind kind_;
 };
 
 }  // namespace
@@ -280,8 +307,12 @@ Outline trace_outline(SurfaceLinks const& links) {
     }
     return it->second;
   };
-  for (Chain const& chain : find_chains(graph)) {
-    ChainSimplifier const simplifier(chain, chain.closed() && graph.degree(chain.corners.front()) == 2);
+  for (Chain const& chain : find_chains(CrackGraph(links))) {
+    auto kind = ChainSimplifier::Kind::between_nodes;
+    if (chain.closed() && !graph.is_node(chain.corners.front())) kind = ChainSimplifier::Kind::free_loop;
+    if (graph.degree(chain.corners.front()) == 1 && graph.degree(chain.corners.back()) == 1)
+      kind = ChainSimplifier::Kind::slit;
+    ChainSimplifier const simplifier(chain, kind);
     std::vector<ChainPlace> const places = simplifier.run();
     for (std::size_t k = 0; k + 1 < places.size(); ++k) {
       OutlineSegment segment;

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "mesh/view_mesh.h"
 #include "tests/mesh/depth_maps.h"
 
 namespace scanview {
@@ -43,6 +44,66 @@ TEST(Outline, ARectangleHasFourSegments) {
 
 TEST(Outline, TheWholePictureHasFourSegments) {
   EXPECT_EQ(outline_of([](int, int) { return 2.0; }).segments.size(), 4u);
+}
+
+/// 3 away, but for a flap that bends forward out of the plane: a straight cut at x = 40.5 along one side of it, to
+/// which its depth falls off, between rows where it is flat again.
+double flap(int x, int y) {
+  if (x > 40 || x <= 20 || y <= 20 || y >= 60) return 3;
+  double const along = std::min(y - 20, 60 - y) / 20.0;
+  return 3 - 0.05 * (x - 20) * along;
+}
+
+TEST(Outline, ASlitHasAVertexBetweenItsEnds) {
+  Outline const outline = outline_of(flap);
+  std::size_t on_slit = 0;
+  for (OutlineSegment const& segment : outline.segments) {
+    double const a = outline.vertices[segment.from].position.x(), b = outline.vertices[segment.to].position.x();
+    on_slit += std::abs(a - 40.5) < 1 && std::abs(b - 40.5) < 1;
+  }
+  EXPECT_GE(on_slit, 2u);
+  expect_parts_its_gates(outline);
+}
+
+TEST(Outline, NoTriangleSpansASlit) {
+  RangeImage const image = depth_map(small_camera(), 1e-3, flap);
+  Context context;
+  MeshOptions options;
+  options.placement = MeshOptions::Placement::insertion;
+  options.tolerance_kind = MeshOptions::Tolerance::units;
+  options.tolerance = 0.01;
+  ViewMesh const result = mesh_range_image(image, options, context).view_mesh;
+  for (Eigen::Vector3i const& t : result.mesh.triangles) {
+    bool left = false, right = false;
+    double least_y = 1e9, greatest_y = 0;
+    for (int i = 0; i < 3; ++i) {
+      Eigen::Vector2d const p = image.camera.project(result.mesh.vertices[t[i]].cast<double>());
+      left = left || p.x() < 40;
+      right = right || p.x() > 41;
+      least_y = std::min(least_y, p.y());
+      greatest_y = std::max(greatest_y, p.y());
+    }
+    // Where the flap stands off the plane by more than a step's tolerance.
+    EXPECT_FALSE(left && right && least_y > 26 && greatest_y < 54) << least_y << " " << greatest_y;
+  }
+}
+
+TEST(Outline, AFreeLoopBeginsWhereItNeedsFewestSegments) {
+  // A rectangle that no node lies on, and whose first corner in reading order is no corner of it: turned.
+  Outline const outline = outline_of([](int x, int y) {
+    return std::abs(x - 48) + std::abs(y - 40) < 20 ? 2.0 : std::numeric_limits<double>::quiet_NaN();
+  });
+  EXPECT_LE(outline.segments.size(), 8u);
+  expect_parts_its_gates(outline);
+}
+
+TEST(Outline, FollowsTheFrameExactlyToWhereTheObjectLeavesIt) {
+  Outline const outline =
+      outline_of([](int x, int y) { return y < 5 && x < 30 ? std::numeric_limits<double>::quiet_NaN() : 2.0; });
+  std::set<std::pair<double, double>> places;
+  for (OutlineVertex const& v : outline.vertices) places.insert({v.position.x(), v.position.y()});
+  for (auto const& corner : {std::pair(29.5, -0.5), {95.5, -0.5}, {95.5, 79.5}, {-0.5, 79.5}, {-0.5, 4.5}})
+    EXPECT_TRUE(places.contains(corner)) << corner.first << " " << corner.second;
 }
 
 TEST(Outline, AStraightSlantedStepIsAFewSegments) {
