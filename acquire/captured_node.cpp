@@ -30,8 +30,8 @@ Camera cube_side_camera(int size) {
 Eigen::Isometry3d scene_from_cube_side(int side, Eigen::Vector3d const& position) {
   double const sign = side % 2 == 0 ? 1 : -1;
   Eigen::Vector3d const forward = sign * Eigen::Vector3d::Unit(side / 2);
-  Eigen::Vector3d const down = side / 2 == 1 ? Eigen::Vector3d(sign * Eigen::Vector3d::UnitZ())
-                                             : Eigen::Vector3d(-Eigen::Vector3d::UnitY());
+  Eigen::Vector3d const down =
+      side / 2 == 1 ? Eigen::Vector3d(sign * Eigen::Vector3d::UnitZ()) : Eigen::Vector3d(-Eigen::Vector3d::UnitY());
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() << down.cross(forward), down, forward;
   pose.translation() = position;

@@ -66,17 +66,24 @@ cv::Mat1f padded_zeros(cv::Size size) {
 }  // namespace
 
 DepthField make_depth_field(RangeImage const& image, SurfaceLinks const& links, cv::Mat1f const& tolerance) {
-  DepthField field{padded_zeros(image.depth.size()), padded_zeros(image.depth.size())};
+  cv::Mat1f linear(tolerance.size());
   bool const perspective = image.camera.is_perspective();
+  for (int y = 0; y < linear.rows; ++y) {
+    for (int x = 0; x < linear.cols; ++x) {
+      double const d = image.depth(y, x), t = tolerance(y, x);
+      linear(y, x) = float(perspective ? 1 / (d * (d / t) + d) : t);
+    }
+  }
+  return make_linear_depth_field(image, links, linear);
+}
+
+DepthField make_linear_depth_field(RangeImage const& image, SurfaceLinks const& links, cv::Mat1f const& tolerance) {
+  DepthField field{padded_zeros(image.depth.size()), padded_zeros(image.depth.size())};
   for (int y = 0; y < field.height(); ++y) {
-    float const* const depths = image.depth[y];
-    float const* const tolerances = tolerance[y];
-    uchar const* const object = links.object[y];
     for (int x = 0; x < field.width(); ++x) {
-      if (!object[x]) continue;
-      double const d = depths[x], t = tolerances[x];
-      field.depth(y, x) = float(perspective ? 1 / d : d);
-      field.weight(y, x) = float(std::min(perspective ? d * (d / t) + d : 1 / t, kGreatestWeight));
+      if (links.object(y, x) == 0) continue;
+      field.depth(y, x) = float(linear_depth(image.camera, image.depth(y, x)));
+      field.weight(y, x) = float(std::min(1.0 / tolerance(y, x), kGreatestWeight));
     }
   }
   return field;

@@ -20,6 +20,9 @@ struct DepthField {
 /// linear depth, counts on both.
 DepthField make_depth_field(RangeImage const& image, SurfaceLinks const& links, cv::Mat1f const& tolerance);
 
+/// The same where `tolerance` is of linear depth: |linear depth − field's| · weight ≤ 1 within it.
+DepthField make_linear_depth_field(RangeImage const& image, SurfaceLinks const& links, cv::Mat1f const& tolerance);
+
 /// A plane over the picture in linear depth: depth + slope · (p − origin).
 struct DepthPlane {
   Eigen::Vector2d origin{0, 0};

@@ -19,7 +19,7 @@ class DepthFit {
       alive_.push_back(t);
       sums_.push_back(scan_sums(field, triangulation.shape(t)));
       for (int const v : triangulation.triangle(t).vertex)
-        if (unknown_of_[v] < 0) {
+        if (unknown_of_[v] < 0 && !triangulation.vertex(v).is_held) {
           unknown_of_[v] = int(vertex_of_.size());
           vertex_of_.push_back(v);
           start_.push_back(triangulation.vertex(v).depth);
@@ -28,7 +28,7 @@ class DepthFit {
   }
 
   std::vector<TriangleError> run() {
-    if (alive_.empty()) return before_;
+    if (vertex_of_.empty()) return before_;
     Eigen::VectorXd const change = solve();
     if (!change.allFinite()) return before_;
     for (std::size_t u = 0; u < vertex_of_.size(); ++u) triangulation_.set_depth(vertex_of_[u], start_[u] + change[u]);
@@ -51,15 +51,17 @@ class DepthFit {
       int unknown[3];
       for (int i = 0; i < 3; ++i) {
         unknown[i] = unknown_of_[triangulation_.triangle(alive_[k]).vertex[i]];
+        if (unknown[i] < 0) continue;
         shape.depth[i] = start_[unknown[i]];
         weights[unknown[i]] += sums_[k].w;
         pixels[unknown[i]] += sums_[k].pixels;
       }
       CornerEquations const equations = corner_equations(shape, sums_[k]);
       for (int i = 0; i < 3; ++i) {
+        if (unknown[i] < 0) continue;
         right[unknown[i]] += equations.right[i];
         for (int j = 0; j < 3; ++j)
-          if (unknown[i] >= unknown[j]) entries.emplace_back(unknown[i], unknown[j], equations.matrix(i, j));
+          if (unknown[j] >= 0 && unknown[i] >= unknown[j]) entries.emplace_back(unknown[i], unknown[j], equations.matrix(i, j));
       }
     }
     for (int u = 0; u < unknowns; ++u) entries.emplace_back(u, u, pixels[u] > 0 ? kHeld * weights[u] / pixels[u] : 1.0);
@@ -81,7 +83,7 @@ class DepthFit {
       if (!is_beyond(t)) continue;
       for (int const v : triangulation_.triangle(t).vertex) {
         int const u = unknown_of_[v];
-        if (way[u] == 0) continue;
+        if (u < 0 || way[u] == 0) continue;
         --way[u];
         triangulation_.set_depth(v, start_[u] + 0.5 * way[u] * change[u]);
         triangulation_.triangles_around(v, around);

@@ -26,7 +26,7 @@ bool turns(Eigen::Vector2d const& a, Eigen::Vector2d const& b, Eigen::Vector2d c
 }  // namespace
 
 int DepthTriangulation::add_vertex(Eigen::Vector2d const& position, double depth, bool on_border) {
-  vertices_.push_back({position, depth, on_border, -1});
+  vertices_.push_back({position, depth, on_border, false, -1});
   return int(vertices_.size()) - 1;
 }
 

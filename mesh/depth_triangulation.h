@@ -20,6 +20,7 @@ class DepthTriangulation {
     Eigen::Vector2d position;  ///< pixels
     double depth = 0;          ///< linear
     bool on_border = false;
+    bool is_held = false;  ///< no fit changes its depth: another picture's mesh has the same vertex
     int triangle = -1;  ///< one around it; −1: removed
   };
   struct Triangle {
@@ -41,6 +42,11 @@ class DepthTriangulation {
   int count() const { return count_; }  ///< triangles that are there
   int count_vertices() const;           ///< that are there
   void set_depth(int v, double depth) { vertices_[v].depth = depth; }
+  /// Of the border.
+  void hold(int v, double depth) {
+    vertices_[v].depth = depth;
+    vertices_[v].is_held = true;
+  }
 
   /// Leaves out what was removed and orders triangles and vertices by place, square after square of the picture, so
   /// that whoever goes through them finds the pixels in the cache.

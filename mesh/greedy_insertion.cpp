@@ -132,6 +132,8 @@ int VertexMaker::split_border(DepthTriangulation& triangulation, int t, Eigen::V
   DepthTriangle const shape = triangulation.shape(t);
   for (int i = 0; i < 3; ++i) {
     if (triangulation.triangle(t).next[i] >= 0) continue;
+    auto const is_held = [&](int k) { return triangulation.vertex(triangulation.triangle(t).vertex[k % 3]).is_held; };
+    if (is_held(i + 1) && is_held(i + 2)) continue;
     Eigen::Vector2d const u = shape.corner[(i + 1) % 3], v = shape.corner[(i + 2) % 3], edge = v - u;
     if (!((u - point).dot(v - point) < kCos * (u - point).norm() * (v - point).norm())) continue;
     double const along = (point - u).dot(edge) / edge.squaredNorm();

@@ -17,7 +17,8 @@ class VertexMaker {
   double depth_at(int x, int y) const;
   /// Halves a border edge of the triangle that is long beside a point so near to it (an angle of more than 135 degrees
   /// at the point), at the foot of the point, so that no sliver lies along it whose normal means nothing. The vertex
-  /// that it made, or −1 where no edge is so, or where vertices are plain, not smooth.
+  /// that it made, or −1 where no edge is so (held vertices keep theirs whole), or where vertices are plain, not
+  /// smooth.
   int split_border(DepthTriangulation& triangulation, int t, Eigen::Vector2d const& point) const;
 
  private:
