@@ -41,10 +41,12 @@ class LumigraphRenderer final : public HeldOutRenderer {
     std::vector<Source> sources;
     for (std::size_t const view : used_) {
       RasterView const* const raster = views_.get(view, true);
-      LayerRasterizer::Layer layer;
-      if (raster == nullptr || !raster->transform_to(camera, object_from_camera, kAllAlike, false, layer.transform))
+      LayerRasterizer::Part part;
+      if (raster == nullptr || !raster->transform_to(camera, object_from_camera, kAllAlike, false, part.transform))
         continue;
-      layer.mesh = &raster->mesh();
+      part.mesh = &raster->mesh();
+      LayerRasterizer::Layer layer;
+      layer.parts = {part};
       layer.largest_lod = static_cast<float>(raster->texture().levels.size() - 1);
       layers.push_back(layer);
       ComposedLayer compose;

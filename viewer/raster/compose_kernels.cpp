@@ -198,10 +198,11 @@ struct Group {
   Lanes* reliable;
   Lanes* seen;
   Lanes* share;
-  V spread;  ///< between the nearest and the furthest sample
+  V nearest, spread;  ///< depth of the nearest sample, and from there to the furthest
 
   /// indices: one a layer; scratch: seven arrays of kMostLanes floats a layer, aligned for vectors.
-  Group(std::size_t layers, std::size_t* indices, float* scratch) : layer(indices), spread(hn::Zero(Floats())) {
+  Group(std::size_t layers, std::size_t* indices, float* scratch)
+      : layer(indices), nearest(hn::Zero(Floats())), spread(nearest) {
     for (Lanes** const part : {&quality, &fair_fill, &rank, &depth, &reliable, &seen, &share}) {
       *part = reinterpret_cast<Lanes*>(scratch);
       scratch += layers * kMostLanes;
@@ -234,6 +235,7 @@ HWY_INLINE void GatherGroup(ComposedLayer const* layers, std::size_t count, Comp
     hn::Store(rank, d, group.rank[k]);
     hn::Store(hn::IfThenElseZero(counts, depth), d, group.depth[k]);
   }
+  group.nearest = nearest;
   group.spread = hn::Sub(furthest, nearest);
 }
 
@@ -241,14 +243,18 @@ HWY_INLINE void GatherGroup(ComposedLayer const* layers, std::size_t count, Comp
 HWY_INLINE void SoftZSeen(Composition const& how, Group& group) {
   Floats const d;
   auto const one = hn::Set(d, 1.0F);
+  auto threshold = hn::Set(d, how.threshold), ramp = hn::Set(d, how.ramp);
+  if (how.growth > 0 || how.parallax > 0) {
+    auto const slope = hn::Add(hn::Set(d, how.growth), hn::Mul(hn::Set(d, how.parallax), group.nearest));
+    threshold = hn::Add(threshold, hn::Mul(slope, group.nearest));
+    ramp = hn::Div(hn::Set(d, 2.0F), hn::Max(threshold, hn::Set(d, 1e-30F)));
+  }
   // Most pixels show one surface.
-  if (hn::AllFalse(d, hn::Gt(group.spread, hn::Set(d, how.threshold)))) {
+  if (hn::AllFalse(d, hn::Gt(group.spread, threshold))) {
     for (std::size_t k = 0; k < group.count; ++k) hn::Store(one, d, group.seen[k]);
     return;
   }
-  auto const hide = [&](V distance) HWY_ATTR {
-    return Clamp(hn::Mul(hn::Sub(distance, hn::Set(d, how.threshold)), hn::Set(d, how.ramp)), 0.0F, 1.0F);
-  };
+  auto const hide = [&](V distance) HWY_ATTR { return Clamp(hn::Mul(hn::Sub(distance, threshold), ramp), 0.0F, 1.0F); };
   for (std::size_t i = 0; i < group.count; ++i) {
     auto const rank = hn::Load(d, group.rank[i]), depth = hn::Load(d, group.depth[i]);
     auto doubt = hn::Zero(d);
@@ -357,7 +363,7 @@ void ComposeLayers(ComposedLayer const* layers, std::size_t count, Composition c
         } else {
           SoftZShares(layers, how, group);
         }
-        if (how.show == 2) OnlyWinner(group);
+        if (how.winner || how.show == 2) OnlyWinner(group);
         Color sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         auto total = hn::Zero(d), sum_z = hn::Zero(d);
         for (std::size_t k = 0; k < group.count; ++k) {

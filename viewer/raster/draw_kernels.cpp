@@ -147,9 +147,10 @@ void TransformVertices(VertexArrays const& vertices, ScreenTransform const& tran
     hn::Store(hn::Mul(row(ScreenTransform::s), inverse), d, value[ScreenVertex::s]);
     hn::Store(hn::Mul(row(ScreenTransform::t), inverse), d, value[ScreenVertex::t]);
     hn::Store(hn::Mul(row(ScreenTransform::texture_w), inverse), d, value[ScreenVertex::w]);
-    hn::Store(Nearness(transform, row(ScreenTransform::x_camera), row(ScreenTransform::y_camera),
-                       row(ScreenTransform::depth)),
-              d, value[ScreenVertex::nearness]);
+    auto nearness = Nearness(transform, row(ScreenTransform::x_camera), row(ScreenTransform::y_camera),
+                             row(ScreenTransform::depth));
+    if (!vertices.quality.empty()) nearness = hn::Mul(nearness, hn::LoadU(d, &vertices.quality[i]));
+    hn::Store(nearness, d, value[ScreenVertex::nearness]);
     if (transform.lit) {
       Relight(vertices, transform, i, &value[ScreenVertex::red]);
     } else {

@@ -47,11 +47,14 @@ struct ComposedLayer {
 /// How layers are mixed: SoftZ, as single precision with finite numbers.
 struct Composition {
   float threshold = 0, ramp = 0;  ///< ramp: 1 / (half a threshold)
+  /// The threshold grows with the depth z of the nearest sample: + growth z + parallax z². Both 0: `ramp` holds.
+  float growth = 0, parallax = 0;
   float reliability_ratio = 0.1F;
   float good_enough = 0, good_at_zero = 0, good_quality = 0, fair_feather = 0, least_weight = 0;
   float always = 0;  ///< views that fill count at least so much
   bool nearest = false;
-  bool agree = false;  ///< samples are taken where the mean depth lies, instead of on each layer's own surface
+  bool winner = false;  ///< of the samples that would be mixed only the one that counts most
+  bool agree = false;   ///< samples are taken where the mean depth lies, instead of on each layer's own surface
   int show = 0;
   bool perspective = true;
 };

@@ -53,7 +53,7 @@ TextureTarget const& LayerRasterizer::Tile::draw(std::size_t layer, float const*
     for (std::size_t i = 0; i < kTilePixels; ++i) target.key[i] = where[i] > 0 ? kNothing : -kNothing;
   }
   triangles_.clear();
-  (*bins_)[layer].collect(index, triangles_);
+  for (std::size_t i = first_bins_[layer]; i < first_bins_[layer + 1]; ++i) (*bins_)[i].collect(index, triangles_);
   draw_textured(triangles_.data(), triangles_.size(), area, target);
   return target;
 }
@@ -62,17 +62,23 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
                            std::function<void(Tile&)> const& compose) {
   if (width < 1 || height < 1 || width > kBlock || height > kBlock)
     throw std::logic_error("LayerRasterizer: a picture of no or too many pixels");
-  if (bins_.size() < layers.size()) bins_.resize(layers.size());
+  std::vector<Part const*> parts;
+  std::vector<std::size_t> first_bins = {0};
+  for (Layer const& layer : layers) {
+    for (Part const& part : layer.parts) parts.push_back(&part);
+    first_bins.push_back(parts.size());
+  }
+  if (bins_.size() < parts.size()) bins_.resize(parts.size());
   threads_->arena.execute([&] {
     auto const start = Clock::now();
-    for (std::size_t i = 0; i < layers.size(); ++i) {
-      bins_[i].begin(*layers[i].mesh, layers[i].transform, width, height, Culling::back_faces);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      bins_[i].begin(*parts[i]->mesh, parts[i]->transform, width, height, Culling::back_faces);
     }
     for_each_part(
-        layers.size(), [&](std::size_t i) { return bins_[i].vertex_parts(); },
+        parts.size(), [&](std::size_t i) { return bins_[i].vertex_parts(); },
         [&](std::size_t i, std::size_t part) { bins_[i].transform(part); });
     for_each_part(
-        layers.size(), [&](std::size_t i) { return bins_[i].triangle_parts(); },
+        parts.size(), [&](std::size_t i) { return bins_[i].triangle_parts(); },
         [&](std::size_t i, std::size_t part) { bins_[i].bin(part); });
     prepare_ms_ = milliseconds_since(start);
 
@@ -85,6 +91,7 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
       tile.index = static_cast<std::size_t>(index);
       tile.of_ = &layers;
       tile.bins_ = &bins_;
+      tile.first_bins_ = first_bins;
       tile.targets_.resize(layers.size());
       while (tile.words_.size() < layers.size()) {
         tile.floats_.emplace_back(3 * kTilePixels);
@@ -100,8 +107,8 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
                             words + kTilePixels,
                             layers[i].largest_lod,
                             layers[i].wireframe,
-                            layers[i].transform.lit,
-                            layers[i].transform.perspective};
+                            layers[i].parts.front().transform.lit,
+                            layers[i].parts.front().transform.perspective};
       }
       compose(tile);
     });

@@ -8,17 +8,21 @@
 
 namespace scanview {
 
-/// Draws several meshes, each into a layer of its own, tile by tile: all layers of a tile are composed while they are
-/// in cache, and no layer is ever stored whole. Vertices, triangles and tiles are each shared out among the threads.
+/// Draws several layers, each of one mesh or of several that hide one another, tile by tile: all layers of a tile are
+/// composed while they are in cache, and no layer is ever stored whole. Vertices, triangles and tiles are each shared
+/// out among the threads.
 class LayerRasterizer {
  public:
   /// threads: at most so many; 0: all processors.
   explicit LayerRasterizer(int threads);
   ~LayerRasterizer();
 
-  struct Layer {
+  struct Part {
     RasterMesh const* mesh = nullptr;
     ScreenTransform transform;
+  };
+  struct Layer {
+    std::vector<Part> parts;  ///< whose transforms agree on perspective and light; at least one
     float largest_lod = 0;
     bool wireframe = false;
   };
@@ -38,7 +42,8 @@ class LayerRasterizer {
    private:
     friend class LayerRasterizer;
     std::vector<Layer> const* of_ = nullptr;
-    std::vector<TriangleBins> const* bins_ = nullptr;
+    std::vector<TriangleBins> const* bins_ = nullptr;  ///< of all parts, layer after layer
+    std::vector<std::size_t> first_bins_;              ///< a layer, and the end
     std::vector<TextureTarget> targets_;
     std::vector<ScreenTriangle> triangles_;
     std::vector<std::vector<float>> floats_;

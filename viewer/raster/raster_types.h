@@ -51,6 +51,7 @@ struct VertexArrays {
   std::size_t count = 0;
   std::vector<float> x, y, z;
   std::vector<float> normal[3], light[3];  ///< VertexLight; or empty
+  std::vector<float> quality;              ///< nearness is multiplied by it; or empty
 };
 
 /// Triangles wider or higher than this many pixels beyond the picture are clipped (guard band); pictures are drawn in

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "viewer/blend/soft_z.h"
 #include "viewer/raster/layer_rasterizer.h"
 #include "viewer/renderer.h"
 
@@ -8,6 +9,9 @@ namespace scanview {
 
 /// A frame of a size, of any content.
 Frame new_frame(int width, int height);
+
+/// SoftZ for the kernels: infinite and zero thresholds stay finite and mean the same.
+Composition composition(SoftZ const& soft_z, Camera const& camera);
 
 /// Draws all layers of a tile, each with the picture that `layers` says, and measures their quality.
 std::vector<ComposedLayer> measured_layers(LayerRasterizer::Tile& tile, std::vector<ComposedLayer> layers,

@@ -9,27 +9,6 @@
 namespace scanview {
 namespace {
 
-/// SoftZ for the kernels: infinite and zero thresholds stay finite and mean the same.
-Composition composition(SoftZ const& soft_z, Camera const& camera) {
-  constexpr double kLargest = 1e30;
-  double const threshold = std::min(soft_z.threshold, kLargest);
-  Composition how;
-  how.threshold = static_cast<float>(threshold);
-  how.ramp = static_cast<float>(threshold > 0 ? std::min(2 / threshold, kLargest) : kLargest);
-  how.reliability_ratio = static_cast<float>(soft_z.reliability_ratio);
-  how.good_enough = static_cast<float>(SoftZ::kGoodEnough);
-  how.good_at_zero = static_cast<float>(SoftZ::kGoodAtZero);
-  how.good_quality = static_cast<float>(SoftZ::kGoodQuality);
-  how.fair_feather = static_cast<float>(SoftZ::kFairFeather);
-  how.always = static_cast<float>(soft_z.always);
-  how.agree = true;
-  how.least_weight = static_cast<float>(SoftZ::kLeastQuality);
-  how.nearest = soft_z.nearest;
-  how.show = static_cast<int>(soft_z.show);
-  how.perspective = camera.is_perspective();
-  return how;
-}
-
 class CpuRenderer final : public ViewBasedRenderer {
  public:
   CpuRenderer(std::shared_ptr<ViewLibrary> library, ViewBasedOptions const& options, int threads)
@@ -65,9 +44,10 @@ class CpuRenderer final : public ViewBasedRenderer {
     double const rank = fill_rank(used);
     for (auto const& view : used) {
       RasterView const& raster = *views_.get(view.view, true);
+      LayerRasterizer::Part part{&raster.mesh(), {}};
+      if (!raster.transform_to(camera, object_from_camera, spacing(), options().relight, part.transform)) continue;
       LayerRasterizer::Layer layer;
-      if (!raster.transform_to(camera, object_from_camera, spacing(), options().relight, layer.transform)) continue;
-      layer.mesh = &raster.mesh();
+      layer.parts = {part};
       layer.largest_lod = static_cast<float>(raster.texture().levels.size() - 1);
       layer.wireframe = options().wireframe;
       layers.push_back(layer);

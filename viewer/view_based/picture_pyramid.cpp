@@ -65,10 +65,24 @@ cv::Rect area_under(ViewMesh const& view_mesh) {
 
 }  // namespace
 
+std::vector<cv::Mat3b> picture_levels(cv::Mat3b const& picture, std::size_t most) {
+  std::vector<cv::Mat3b> levels = {picture};
+  cv::Mat3f linear = linear_light(picture);
+  while (levels.size() < most && (linear.rows > 1 || linear.cols > 1)) {
+    cv::Mat3f half;
+    cv::resize(linear, half, cv::Size(std::max(1, linear.cols / 2), std::max(1, linear.rows / 2)), 0, 0,
+               cv::INTER_AREA);
+    linear = half;
+    levels.push_back(encoded(linear));
+  }
+  return levels;
+}
+
 PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mesh) {
   PicturePyramid pyramid;
   pyramid.area = area_under(view_mesh);
-  pyramid.levels.push_back(padded(pyramid.area).clone());
+  constexpr std::size_t kAll = 32;
+  pyramid.levels = picture_levels(padded(pyramid.area).clone(), kAll);
   pyramid.feather.create(pyramid.area.size());
   std::array<std::uint8_t, 256> root{};
   for (std::size_t i = 0; i < root.size(); ++i) {
@@ -78,14 +92,6 @@ PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mes
     for (int x = 0; x < pyramid.area.width; ++x) {
       pyramid.feather(y, x) = root[view_mesh.feather(pyramid.area.y + y, pyramid.area.x + x)];
     }
-  }
-  cv::Mat3f linear = linear_light(pyramid.levels.front());
-  while (linear.rows > 1 || linear.cols > 1) {
-    cv::Mat3f half;
-    cv::resize(linear, half, cv::Size(std::max(1, linear.cols / 2), std::max(1, linear.rows / 2)), 0, 0,
-               cv::INTER_AREA);
-    linear = half;
-    pyramid.levels.push_back(encoded(linear));
   }
   return pyramid;
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -14,6 +15,9 @@ struct PicturePyramid {
   std::vector<cv::Mat3b> levels;
   cv::Mat1b feather;  ///< of `area`: the square root of the view's, 255 is 1
 };
+
+/// The levels of a picture, itself the first, `most` at most.
+std::vector<cv::Mat3b> picture_levels(cv::Mat3b const& picture, std::size_t most);
 
 /// `padded`: padded_texture() of the view.
 PicturePyramid picture_pyramid(cv::Mat3b const& padded, ViewMesh const& view_mesh);
