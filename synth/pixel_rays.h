@@ -19,6 +19,18 @@ class PixelRays {
   /// Of the ray through a pixel's centre.
   RayHit center_hit(int x, int y) const { return scene_.first_hit(eye_.cast<float>(), direction(x, y).cast<float>()); }
 
+  /// Calls `work(x, hit)` for the rays through the centres of a row's pixels.
+  template <class Work>
+  void for_each_center(int y, Work const& work) const {
+    RayDirections directions;
+    for (int first = 0; first < camera_.width(); first += kPacket) {
+      int const count = std::min(camera_.width() - first, kPacket);
+      for (int i = 0; i < kPacket; ++i) directions[i] = direction(first + std::min(i, count - 1), y).cast<float>();
+      auto const hits = scene_.first_hits(eye_.cast<float>(), directions);
+      for (int i = 0; i < count; ++i) work(first + i, hits[i]);
+    }
+  }
+
   /// Calls `work(hit, direction)` for `side` x `side` rays spread evenly over a pixel, row by row.
   template <class Work>
   void for_each_sample(int x, int y, int side, Work const& work) const {

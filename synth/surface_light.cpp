@@ -184,10 +184,11 @@ bool SurfaceLight::is_lit(int triangle, Vector3f const& direction) const {
 }
 
 void SurfaceLight::light(RayScene const& scene, float radius, Context& context, std::string const& stage) {
-  Surroundings const surroundings(scene, radius, options_);
   std::vector<std::size_t> chunks;
   for (std::size_t chunk = 0; chunk < has_new_.size(); ++chunk)
     if (has_new_[chunk].load(std::memory_order_relaxed)) chunks.push_back(chunk);
+  if (chunks.empty()) return;
+  Surroundings const surroundings(scene, radius, options_);
   auto const light_chunk = [&](std::size_t task) {
     std::size_t const chunk = chunks[task], end = std::min(points_.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
