@@ -15,9 +15,10 @@ namespace scanview {
 struct ModelCameraOptions {
   /// baked: a diffuse light with shadows that is fixed to the model (SurfaceLight); painted: its colours as they are.
   enum class Light { baked, painted } light = Light::baked;
-  int samples_side = 4;                                 ///< rays a side of a pixel for colour, 1 to 64
-  std::string background = kSkyColor;                   ///< of what no ray meets, sRGB
-  SurfaceLightOptions surface = {192, 1.25f, 0.5f, 1};  ///< of baked light; fill_reach in shares of the model's radius
+  int samples_side = 4;                ///< rays a side of a pixel for colour, 1 to 64
+  std::string background = kSkyColor;  ///< of what no ray meets, sRGB
+  /// Of baked light; the defaults are for rooms. Here fill_reach is a share of the model's radius.
+  SurfaceLightOptions surface = {.directions = 384, .exposure = 1.6f, .fill = 0.6f, .fill_reach = 0.1f};
   /// Throws Error{usage} naming the field and its range.
   void validate() const;
 };
@@ -26,7 +27,7 @@ struct ModelCameraOptions {
 /// computed when a picture first shows a surface, and kept; pictures do not depend on the order in which they are taken
 /// or on the number of threads.
 ///
-/// Some 5 to 10 million rays a second and core; memory about 200 bytes a triangle. One call of capture or picture at a
+/// Some 5 to 10 million rays a second and core. One call of capture or picture at a
 /// time.
 class ModelCamera {
  public:
