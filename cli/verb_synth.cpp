@@ -46,8 +46,7 @@ void scan(std::string const& option, std::string const& text, char const* format
 }
 
 TriangleMesh load_model(std::string const& model) {
-  auto const names = builtin_model_names();
-  if (std::find(names.begin(), names.end(), model) != names.end()) return builtin_model(model);
+  if (is_builtin_model(model)) return builtin_model(model);
   return read_triangle_mesh(model);
 }
 
@@ -347,7 +346,9 @@ void add_synth(CLI::App& app, Session& session) {
       "synth", "Captures a model: what two cameras see of a swept light, and the exact truth beside it");
   std::string names;
   for (auto const& name : builtin_model_names()) names += " " + name;
-  verb->add_option("model", arguments->model, "A PLY or OBJ file, or a built-in object:" + names)->required();
+  verb->add_option("model", arguments->model,
+                   "A PLY or OBJ file, or a built-in model:" + names + " (gallery:N has N polygons)")
+      ->required();
   verb->add_option("-o,--output", arguments->output, "The capture (or scan set) to make")->required();
   verb->add_option("--pattern", arguments->pattern,
                    "sweep: a plane of light in steps; gray: a projector's Gray code; range: no capture, but a scan set "

@@ -60,7 +60,7 @@ CaptureScene::CaptureScene(TriangleMesh const& model, CenteredModel const& cente
     surface_.mark_seen(t, normal);
     surface_.mark_seen(t, -normal);
   }
-  surface_.light(object_, static_cast<float>(centered.radius), context);
+  surface_.light(object_, static_cast<float>(centered.radius), context, "light");
 }
 
 Vector3f CaptureScene::face_normal(int triangle) const {
@@ -162,7 +162,7 @@ void CaptureScene::look_at_object(SceneSample& sample, RayHit const& hit, Vector
   Vector3f const along = (to_model * direction).cast<float>();
   sample.normal = to_model.transpose() * face_normal(hit.triangle).cast<double>();
   if (sample.normal.dot(direction) > 0) sample.normal = -sample.normal;
-  sample.albedo = luminance(surface_.albedo(hit));
+  sample.albedo = luminance(surface_.paint().at(hit));
   sample.room = surface_.leaving(hit, along);
   Vector3d const to_lamp = lamp_ - sample.point;
   if (sample.normal.dot(to_lamp) <= 0) return;

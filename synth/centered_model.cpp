@@ -30,12 +30,16 @@ CenteredModel centered(TriangleMesh const& model) {
 
 double exact_distance(CenteredModel const& model, Eigen::Vector3i const& triangle, RayHit const& hit,
                       Vector3d const& origin, Vector3d const& direction) {
-  Vector3d const a = model.vertices[triangle[0]].cast<double>(), b = model.vertices[triangle[1]].cast<double>(),
-                 c = model.vertices[triangle[2]].cast<double>();
+  auto const at = [&](int corner) -> Vector3d { return model.vertices[triangle[corner]].cast<double>(); };
+  return exact_distance({at(0), at(1), at(2)}, hit, origin, direction, 1e-4 * (hit.distance + model.radius));
+}
+
+double exact_distance(std::array<Vector3d, 3> const& corners, RayHit const& hit, Vector3d const& origin,
+                      Vector3d const& direction, double margin) {
+  auto const& [a, b, c] = corners;
   Vector3d const normal = (b - a).cross(c - a);
   // A plane seen edge-on says nothing.
   double const exact = normal.dot(a - origin) / normal.dot(direction);
-  double const margin = 1e-4 * (hit.distance + model.radius);
   return std::abs(exact - hit.distance) < margin ? exact : hit.distance;
 }
 

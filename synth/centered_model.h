@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <vector>
 
 #include "mesh/triangle_mesh.h"
@@ -21,6 +22,11 @@ CenteredModel centered(TriangleMesh const& model);
 /// (single is what the ray caster gives: some 1e-6 of the distance). `origin` in the model's centred coordinates.
 double exact_distance(CenteredModel const& model, Eigen::Vector3i const& triangle, RayHit const& hit,
                       Eigen::Vector3d const& origin, Eigen::Vector3d const& direction);
+
+/// The same for a triangle's corners a, b, c. Where plane and `hit` are further than `margin` apart, or there is no
+/// plane, the hit decides.
+double exact_distance(std::array<Eigen::Vector3d, 3> const& corners, RayHit const& hit, Eigen::Vector3d const& origin,
+                      Eigen::Vector3d const& direction, double margin);
 
 /// A camera at `eye` that looks at `target`, its picture's upper side towards +y (towards -z when it looks down or up).
 Eigen::Isometry3d look_at(Eigen::Vector3d const& eye, Eigen::Vector3d const& target);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "base/error.h"
@@ -20,6 +21,12 @@ Eigen::Vector3f linear_from_hex(std::string const& hex) {
   if (!good) throw Error(ErrorCode::usage, {}, fmt::format("colour '{}': expected #rrggbb", hex));
   auto const channel = [&](int shift) { return static_cast<float>(linear_from_srgb8()[value >> shift & 0xff]); };
   return {channel(16), channel(8), channel(0)};
+}
+
+cv::Vec3d bgr_from_linear(Eigen::Vector3f const& linear) {
+  cv::Vec3d bgr;
+  for (int c = 0; c < 3; ++c) bgr[c] = 255.0 * srgb_from_linear(std::clamp(linear[2 - c], 0.0f, 1.0f));
+  return bgr;
 }
 
 }  // namespace scanview

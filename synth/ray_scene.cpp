@@ -102,10 +102,11 @@ RayHit RayScene::first_hit(Vector3f const& origin, Vector3f const& direction) co
   return {static_cast<int>(query.hit.primID), query.hit.u, query.hit.v, query.ray.tfar};
 }
 
-std::array<RayHit, kPacket> RayScene::first_hits(Vector3f const& origin, RayDirections const& directions) const {
+std::array<RayHit, kPacket> RayScene::first_hits(Vector3f const& origin, RayDirections const& directions,
+                                                 float nearest) const {
   RTCRayHit16 query;
   for (int i = 0; i < kPacket; ++i) {
-    set_ray(query.ray, i, origin, directions[i], 0);
+    set_ray(query.ray, i, origin, directions[i], nearest);
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }

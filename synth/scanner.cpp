@@ -10,8 +10,9 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
-#include "base/srgb.h"
 #include "synth/disturbed_pose.h"
+#include "synth/linear_color.h"
+#include "synth/pixel_rays.h"
 #include "synth/ray_scene.h"
 #include "synth/surface_light.h"
 
@@ -24,7 +25,6 @@ using Eigen::Vector3f;
 
 constexpr int kBandRows = 8;     // a task
 constexpr int kSamplesSide = 4;  // rays a side of a pixel for colour
-static_assert(kSamplesSide * kSamplesSide == kPacket);
 
 /// From the object's centre to the eye of a view, unit.
 Vector3d eye_direction(SynthOptions const& options, int view) {
@@ -62,64 +62,9 @@ Camera make_camera(SynthOptions const& options, CenteredModel const& model, std:
                              0.5 * (options.height - 1));
 }
 
-/// Casts the rays of one view, in coordinates about the model's centre.
-class ViewScan {
- public:
-  ViewScan(CenteredModel const& model, std::vector<Eigen::Vector3i> const& triangles, RayScene const& scene,
-           Camera const& camera, Isometry3d const& object_from_camera)
-      : model_(model),
-        triangles_(triangles),
-        scene_(scene),
-        camera_(camera),
-        rotation_(object_from_camera.linear()),
-        eye_(object_from_camera.translation() - model.center) {}
-
-  /// Depth of the surface at a pixel's centre; NaN where none is.
-  float depth(int x, int y) const {
-    Vector3d const direction = rotation_ * camera_.ray_direction(x, y);
-    RayHit const hit = scene_.first_hit(eye_.cast<float>(), direction.cast<float>());
-    if (hit.triangle < 0) return kMissing;
-    // The direction has z = 1 in the camera, so the ray's parameter is the depth.
-    return static_cast<float>(exact_distance(model_, triangles_[hit.triangle], hit, eye_, direction));
-  }
-
-  /// Calls `work(hit, direction)` for the 4 x 4 rays of a pixel.
-  template <class Work>
-  void for_each_sample(int x, int y, Work const& work) const {
-    RayDirections directions;
-    for (int i = 0; i < kPacket; ++i) {
-      double const u = x + (i % kSamplesSide + 0.5) / kSamplesSide - 0.5;
-      double const v = y + (i / kSamplesSide + 0.5) / kSamplesSide - 0.5;
-      directions[i] = (rotation_ * camera_.ray_direction(u, v)).cast<float>();
-    }
-    auto const hits = scene_.first_hits(eye_.cast<float>(), directions);
-    for (int i = 0; i < kPacket; ++i) work(hits[i], directions[i]);
-  }
-
- private:
-  CenteredModel const& model_;
-  std::vector<Eigen::Vector3i> const& triangles_;
-  RayScene const& scene_;
-  Camera camera_;
-  Eigen::Matrix3d rotation_;
-  Vector3d eye_;
-};
-
-/// What no ray hits, linear R G B.
-Vector3f background() {
-  static Vector3f const color =
-      Vector3d(linear_from_srgb(96 / 255.0), linear_from_srgb(110 / 255.0), linear_from_srgb(128 / 255.0))
-          .cast<float>();
-  return color;
-}
-
 cv::Vec3b encoded(Vector3f const& linear, double noise_sigma, CounterRandom& random) {
-  cv::Vec3b bgr;
-  for (int c = 0; c < 3; ++c) {
-    double value = 255.0 * srgb_from_linear(std::clamp(linear[2 - c], 0.0f, 1.0f));
-    if (noise_sigma > 0) value += noise_sigma * random.normal();
-    bgr[c] = cv::saturate_cast<uchar>(value);
-  }
+  cv::Vec3d bgr = bgr_from_linear(linear);
+  for (int c = 0; c < 3 && noise_sigma > 0; ++c) bgr[c] += noise_sigma * random.normal();
   return bgr;
 }
 
@@ -147,6 +92,7 @@ SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, C
   CenteredModel const object = centered(model);
   RayScene const scene(object.vertices, model.triangles);
   SurfaceLight light(object.vertices, model.triangles, model.colors);
+  Vector3f const background = linear_from_hex(kSkyColor);
 
   double const noise_sigma = options.noise.depth_sigma * object.radius;
   double const sigma = std::hypot(noise_sigma, kSynthDepthFloor * object.radius);
@@ -180,23 +126,27 @@ SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, C
         context, bands * result.true_poses.size(),
         [&](std::size_t task) {
           std::size_t const v = task / bands;
-          ViewScan const scan(object, model.triangles, scene, camera, result.true_poses[v]);
+          Isometry3d const& pose = result.true_poses[v];
+          PixelRays const rays(scene, camera, pose.linear(), pose.translation() - object.center);
           int const first = static_cast<int>(task % bands) * kBandRows;
           for (int y = first; y < std::min(first + kBandRows, options.height); ++y)
-            for (int x = 0; x < options.width; ++x) work(scan, v, x, y);
+            for (int x = 0; x < options.width; ++x) work(rays, v, x, y);
         },
         stage);
   };
-  for_each_pixel("look", [&](ViewScan const& scan, std::size_t, int x, int y) {
-    scan.for_each_sample(x, y, [&](RayHit const& hit, Vector3f const& direction) {
+  for_each_pixel("look", [&](PixelRays const& rays, std::size_t, int x, int y) {
+    rays.for_each_sample(x, y, kSamplesSide, [&](RayHit const& hit, Vector3f const& direction) {
       if (hit.triangle >= 0) light.mark_seen(hit.triangle, direction);
     });
   });
-  light.light(scene, static_cast<float>(object.radius), context);
-  for_each_pixel("scan", [&](ViewScan const& scan, std::size_t v, int x, int y) {
+  light.light(scene, static_cast<float>(object.radius), context, "light");
+  for_each_pixel("scan", [&](PixelRays const& rays, std::size_t v, int x, int y) {
     CounterRandom random(context.seed, v, static_cast<std::uint64_t>(y) * options.width + x);
     RangeImage& image = result.set.views[v].image;
-    float const depth = scan.depth(x, y);
+    RayHit const hit = rays.center_hit(x, y);
+    float const depth = hit.triangle < 0 ? kMissing
+                                         : static_cast<float>(exact_distance(object, model.triangles[hit.triangle], hit,
+                                                                             rays.eye(), rays.direction(x, y)));
     result.true_depth[v](y, x) = depth;
     auto const measured = static_cast<float>(depth + noise_sigma * random.normal());
     if (measured > 0) {
@@ -207,8 +157,8 @@ SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, C
       image.classes(y, x) = static_cast<uchar>(PixelClass::no_depth);  // noise carried it behind the camera
     }
     Vector3f sum = Vector3f::Zero();
-    scan.for_each_sample(x, y, [&](RayHit const& hit, Vector3f const& direction) {
-      sum += hit.triangle < 0 ? background() : light.leaving(hit, direction);
+    rays.for_each_sample(x, y, kSamplesSide, [&](RayHit const& hit, Vector3f const& direction) {
+      sum += hit.triangle < 0 ? background : light.leaving(hit, direction);
     });
     image.color(y, x) = encoded(sum / kPacket, options.noise.color_sigma, random);
   });

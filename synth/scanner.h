@@ -52,9 +52,13 @@ inline constexpr double kSynthDepthFloor = 1e-4;
 /// 33 rays a pixel and about fifty for every vertex that is seen; some 5 to 10 million rays a second and core.
 SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, Context& context);
 
-/// Built-in procedural objects, coloured per vertex, finely enough to serve as texture: "statuette" (concavities, thin
-/// parts, holes; about 100 mm tall, y up). Throws Error{usage} for an unknown name.
+/// Built-in procedural models, coloured per vertex, y up: "dog", "basket" and "statuette", objects of about 100 units
+/// (mm) with concavities, thin parts and holes, finely enough for their colours to serve as texture; "gallery", rooms
+/// to walk through in metres (gallery.h), of 100 000 triangles, and "gallery:N" of about N. Throws Error{usage} for an
+/// unknown name or an N out of range.
 TriangleMesh builtin_model(std::string const& name);
 std::vector<std::string> builtin_model_names();
+/// Whether builtin_model means the name: one of builtin_model_names, or gallery:N.
+bool is_builtin_model(std::string const& name);
 
 }  // namespace scanview

@@ -3,10 +3,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/parallel.h"
-#include "base/srgb.h"
 
 namespace scanview {
 namespace {
@@ -14,10 +14,9 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector3i;
 
-constexpr std::size_t kDirections = 6 * kPacket;
-constexpr std::size_t kChunk = 1 << 10;  // shading points a task
-cv::Vec3b const kPlaster(205, 214, 222);
-constexpr float kCreaseCos = 0.766f;  // cos 40°
+constexpr std::size_t kChunk = 1 << 10;        // shading points a task
+Vector3f const kFillTint(1.0f, 0.97f, 0.92f);  // walls are warmer than the sky
+constexpr float kCreaseCos = 0.766f;           // cos 40°
 
 /// A direction light comes from, and how much of it.
 struct Source {
@@ -33,11 +32,11 @@ Vector3f radiance_from(Vector3f const& direction) {
 }
 
 /// Equal areas of the sphere (Fibonacci spiral), scaled so that only the most brightly lit white is clipped.
-std::vector<Source> light_sources() {
-  std::vector<Source> sources(kDirections);
+std::vector<Source> light_sources(int directions) {
+  std::vector<Source> sources(directions);
   double const golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
-  for (std::size_t i = 0; i < kDirections; ++i) {
-    double const y = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / kDirections;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    double const y = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / directions;
     double const r = std::sqrt(1.0 - y * y), a = golden * static_cast<double>(i);
     sources[i].direction = Eigen::Vector3d(r * std::cos(a), y, r * std::sin(a)).cast<float>();
     sources[i].radiance = radiance_from(sources[i].direction);
@@ -58,40 +57,78 @@ std::vector<Source> light_sources() {
   return sources;
 }
 
-Vector3f irradiance(Vector3f const& position, Vector3f const& normal, std::vector<Source> const& sources,
-                    RayScene const& scene, float radius) {
-  Vector3f sum = Vector3f::Zero();
-  std::array<Vector3f, kPacket> origins;
-  origins.fill(position + 5e-4f * radius * normal);
-  RayDirections directions;
-  directions.fill(normal);
-  std::array<Vector3f, kPacket> arriving;
-  int count = 0;
-  auto const cast = [&] {
-    auto const blocked = scene.occluded(origins, directions, count, 2e-3f * radius);
-    for (int i = 0; i < count; ++i)
-      if (!blocked[i]) sum += arriving[i];
-    count = 0;
-  };
-  for (Source const& source : sources) {
-    float const cosine = source.direction.dot(normal);
-    if (cosine <= 0) continue;
-    directions[count] = source.direction;
-    arriving[count++] = cosine * source.radiance;
-    if (count == kPacket) cast();
+/// The open sky and what blocks it.
+class Surroundings {
+ public:
+  Surroundings(RayScene const& scene, float radius, SurfaceLightOptions const& options)
+      : scene_(scene), radius_(radius), options_(options), sources_(light_sources(options.directions)) {
+    Vector3f sum = Vector3f::Zero();
+    for (Source const& source : sources_) sum += source.radiance;
+    fill_ = options.fill / static_cast<float>(sources_.size()) * sum.cwiseProduct(kFillTint);
   }
-  if (count > 0) cast();
-  return sum;
-}
+
+  Vector3f irradiance(Vector3f const& position, Vector3f const& normal) const {
+    Vector3f sum = Vector3f::Zero();
+    Vector3f const origin = position + 5e-4f * radius_ * normal;
+    RayDirections directions;
+    directions.fill(normal);
+    std::array<Vector3f, kPacket> radiance;
+    int count = 0;
+    auto const cast = [&] {
+      auto const distances = blocked_at(origin, directions, count);
+      for (int i = 0; i < count; ++i) {
+        if (distances[i] == kOpen)
+          sum += directions[i].dot(normal) * radiance[i];
+        else if (options_.fill > 0)
+          sum += directions[i].dot(normal) * distances[i] / (distances[i] + options_.fill_reach) * fill_;
+      }
+      count = 0;
+    };
+    for (Source const& source : sources_) {
+      if (source.direction.dot(normal) <= 0) continue;
+      directions[count] = source.direction;
+      radiance[count++] = source.radiance;
+      if (count == kPacket) cast();
+    }
+    if (count > 0) cast();
+    return options_.exposure * sum;
+  }
+
+ private:
+  static constexpr float kOpen = std::numeric_limits<float>::infinity();
+
+  /// How far each ray comes; where that is not asked for, 0 or kOpen.
+  std::array<float, kPacket> blocked_at(Vector3f const& origin, RayDirections const& directions, int count) const {
+    float const nearest = 2e-3f * radius_;
+    std::array<float, kPacket> distances{};
+    if (options_.fill > 0) {
+      auto const hits = scene_.first_hits(origin, directions, nearest);
+      for (int i = 0; i < count; ++i) distances[i] = hits[i].triangle < 0 ? kOpen : hits[i].distance;
+    } else {
+      std::array<Vector3f, kPacket> origins;
+      origins.fill(origin);
+      auto const blocked = scene_.occluded(origins, directions, count, nearest);
+      for (int i = 0; i < count; ++i) distances[i] = blocked[i] ? 0 : kOpen;
+    }
+    return distances;
+  }
+
+  RayScene const& scene_;
+  float radius_;
+  SurfaceLightOptions const& options_;
+  std::vector<Source> sources_;
+  Vector3f fill_;  // from each direction that a far surface blocks
+};
 
 }  // namespace
 
 SurfaceLight::SurfaceLight(std::vector<Vector3f> const& vertices, std::vector<Vector3i> const& triangles,
-                           std::vector<cv::Vec3b> const& colors)
-    : vertices_(vertices), triangles_(triangles), colors_(colors), corners_(triangles) {
+                           std::vector<cv::Vec3b> const& colors, SurfaceLightOptions const& options)
+    : vertices_(vertices), triangles_(triangles), paint_(triangles, colors), options_(options), corners_(triangles) {
   gather_points();
+  has_new_ = std::vector<std::atomic<bool>>((points_.size() + kChunk - 1) / kChunk);
   for (int side : {front, back}) {
-    seen_[side] = std::vector<std::atomic<bool>>(points_.size());
+    states_[side] = std::vector<std::atomic<State>>(points_.size());
     light_[side].assign(points_.size(), Vector3f::Zero());
   }
 }
@@ -130,39 +167,50 @@ SurfaceLight::Side SurfaceLight::side_seen(int triangle, Vector3f const& directi
 }
 
 void SurfaceLight::mark_seen(int triangle, Vector3f const& direction) {
-  auto& seen = seen_[side_seen(triangle, direction)];
+  auto& states = states_[side_seen(triangle, direction)];
   for (int c = 0; c < 3; ++c) {
-    auto& mark = seen[corners_[triangle][c]];
-    if (!mark.load(std::memory_order_relaxed)) mark.store(true, std::memory_order_relaxed);  // keeps cache lines shared
+    std::size_t const point = corners_[triangle][c];
+    if (states[point].load(std::memory_order_relaxed) != State::unseen) continue;  // keeps cache lines shared
+    states[point].store(State::seen, std::memory_order_relaxed);
+    has_new_[point / kChunk].store(true, std::memory_order_relaxed);
   }
 }
 
-void SurfaceLight::light(RayScene const& scene, float radius, Context& context) {
-  std::vector<Source> const sources = light_sources();
-  std::array<float, 256> linear;
-  for (int i = 0; i < 256; ++i) linear[i] = static_cast<float>(linear_from_srgb(i / 255.0));
-  auto const light_chunk = [&](std::size_t chunk) {
-    std::size_t const end = std::min(points_.size(), (chunk + 1) * kChunk);
+bool SurfaceLight::is_lit(int triangle, Vector3f const& direction) const {
+  auto const& states = states_[side_seen(triangle, direction)];
+  for (int c = 0; c < 3; ++c)
+    if (states[corners_[triangle][c]].load(std::memory_order_relaxed) != State::lit) return false;
+  return true;
+}
+
+void SurfaceLight::light(RayScene const& scene, float radius, Context& context, std::string const& stage) {
+  std::vector<std::size_t> chunks;
+  for (std::size_t chunk = 0; chunk < has_new_.size(); ++chunk)
+    if (has_new_[chunk].load(std::memory_order_relaxed)) chunks.push_back(chunk);
+  if (chunks.empty()) return;
+  Surroundings const surroundings(scene, radius, options_);
+  auto const light_chunk = [&](std::size_t task) {
+    std::size_t const chunk = chunks[task], end = std::min(points_.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      if (points_[i].normal_sum.isZero(0)) continue;  // of degenerate triangles only
-      cv::Vec3b const bgr = colors_.empty() ? kPlaster : colors_[points_[i].vertex];
-      Vector3f const albedo(linear[bgr[2]], linear[bgr[1]], linear[bgr[0]]);
+      bool const has_normal = !points_[i].normal_sum.isZero(0);  // not of degenerate triangles only
       Vector3f const normal = points_[i].normal_sum.normalized();
       for (int side : {front, back}) {
-        if (!seen_[side][i].load(std::memory_order_relaxed)) continue;
+        if (states_[side][i].load(std::memory_order_relaxed) != State::seen) continue;
         Vector3f const outward = side == front ? normal : Vector3f(-normal);
-        light_[side][i] =
-            albedo.cwiseProduct(irradiance(vertices_[points_[i].vertex], outward, sources, scene, radius));
+        if (has_normal) light_[side][i] = surroundings.irradiance(vertices_[points_[i].vertex], outward);
+        states_[side][i].store(State::lit, std::memory_order_relaxed);
       }
     }
+    has_new_[chunk].store(false, std::memory_order_relaxed);
   };
-  for_each_index(context, (points_.size() + kChunk - 1) / kChunk, light_chunk, "light");
+  for_each_index(context, chunks.size(), light_chunk, stage);
 }
 
 Vector3f SurfaceLight::leaving(RayHit const& hit, Vector3f const& direction) const {
   auto const& light = light_[side_seen(hit.triangle, direction)];
-  Vector3i const& c = corners_[hit.triangle];
-  return (1 - hit.u - hit.v) * light[c[0]] + hit.u * light[c[1]] + hit.v * light[c[2]];
+  Vector3i const &c = corners_[hit.triangle], &t = triangles_[hit.triangle];
+  auto const at = [&](int i) -> Vector3f { return paint_.at_vertex(t[i]).cwiseProduct(light[c[i]]); };
+  return (1 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2);
 }
 
 Vector3f SurfaceLight::normal(RayHit const& hit, Vector3f const& direction) const {
@@ -170,20 +218,6 @@ Vector3f SurfaceLight::normal(RayHit const& hit, Vector3f const& direction) cons
   auto const at = [&](int i) { return points_[c[i]].normal_sum.normalized(); };
   Vector3f const smooth = ((1 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2)).normalized();
   return side_seen(hit.triangle, direction) == front ? smooth : Vector3f(-smooth);
-}
-
-Vector3f SurfaceLight::albedo(RayHit const& hit) const {
-  static std::array<float, 256> const linear = [] {
-    std::array<float, 256> table{};
-    for (std::size_t i = 0; i < table.size(); ++i) table[i] = static_cast<float>(linear_from_srgb8()[i]);
-    return table;
-  }();
-  Vector3i const& t = triangles_[hit.triangle];
-  auto const at = [&](int i) {
-    cv::Vec3b const bgr = colors_.empty() ? kPlaster : colors_[t[i]];
-    return Vector3f(linear[bgr[2]], linear[bgr[1]], linear[bgr[0]]);
-  };
-  return (1 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2);
 }
 
 }  // namespace scanview
