@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 
 constexpr double kWantedEyes = 450;
 constexpr std::size_t kFewestEyes = 300, kMostEyes = 600;
-constexpr double kMostCells = 1e6;
+constexpr double kMostCells = 1e6, kMostDerivedCells = 3e4;
 constexpr double kMostBytes = 1e9;
 
 double clearance_of(SceneSight const& scene, PlacementOptions const& options) {
@@ -122,8 +122,10 @@ std::vector<Vector3d> walkable_eyes(SceneSight const& scene, WalkRegion const& r
   auto eyes = at(options.spacing > 0 ? options.spacing : spacing_for(region.box, cells));
   for (int attempt = 0; options.spacing == 0 && attempt < 6; ++attempt) {
     if (eyes.size() >= kFewestEyes && eyes.size() <= kMostEyes) break;
-    cells =
-        std::clamp(cells * kWantedEyes / std::max<double>(1, static_cast<double>(eyes.size())), 1.0, 0.1 * kMostCells);
+    double const wanted = cells * kWantedEyes / std::max(1.0, static_cast<double>(eyes.size()));
+    double const next = std::clamp(wanted, 1.0, kMostDerivedCells);
+    if (next == cells) break;
+    cells = next;
     eyes = at(spacing_for(region.box, cells));
   }
   if (eyes.empty())
