@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <compare>
 #include <limits>
 #include <optional>
 #include <span>
+#include <tuple>
 
 #include "base/parallel.h"
 #include "base/random.h"
@@ -20,7 +20,9 @@ using Words = std::vector<std::uint64_t>;
 /// number of uncovered items beyond the spare ones, so that many small gaps count as a large one does.
 struct Lack {
   std::uint64_t missing = 0, uncovered = 0;
-  auto operator<=>(Lack const&) const = default;
+  bool operator<(Lack const& other) const {
+    return std::tie(missing, uncovered) < std::tie(other.missing, other.uncovered);
+  }
 };
 
 constexpr Lack kWorst{std::numeric_limits<std::uint64_t>::max(), std::numeric_limits<std::uint64_t>::max()};
@@ -170,12 +172,12 @@ class Search {
 };
 
 std::size_t least(std::vector<Lack> const& lacks) {
-  return static_cast<std::size_t>(std::ranges::min_element(lacks) - lacks.begin());
+  return static_cast<std::size_t>(std::min_element(lacks.begin(), lacks.end()) - lacks.begin());
 }
 
 /// Tries to cover with as many sets as are chosen; how that ended is in search.lack(). Each step takes away the set
 /// that is missed the least and adds the best other; groups that stay uncovered weigh more with every step, which leads
-/// out of every local optimum (row weighting: Gao, Weise, Li 2015).
+/// out of every local optimum (row weighting: Gao, Yao, Weise, Li 2015).
 void exchange(Search& search, int steps, CounterRandom random) {
   constexpr std::size_t kTabu = 3;  // steps for which what was just taken away stays away
   std::vector<std::size_t> refused;

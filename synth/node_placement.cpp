@@ -62,8 +62,8 @@ std::vector<Vector3d> eyes_at_spacing(SceneSight const& scene, WalkRegion const&
   for_each_index(context, (cells + kCellsATask - 1) / kCellsATask, [&](std::size_t task) {
     for (std::size_t i = task * kCellsATask; i < std::min(cells, (task + 1) * kCellsATask); ++i) {
       CounterRandom random(seed, i);
-      Vector3d const cell(static_cast<double>(i % nx), static_cast<double>(i / nx % ny),
-                          static_cast<double>(i / nx / ny));
+      std::size_t const x = i % nx, y = i / nx % ny, z = i / (nx * ny);
+      Vector3d const cell(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
       Vector3d const jitter(random.uniform(), random.uniform(), random.uniform());
       Vector3d const eye =
           region.box.min() + ((cell + jitter).array() / counts.array() * region.box.sizes().array()).matrix();
@@ -210,7 +210,8 @@ WalkRegion default_walk_region(TriangleMesh const& mesh, PlacementOptions const&
   std::vector<double> floors, heights;
   double const skin = 1e-3 * scene.radius();
   for (int i = 0; i < kColumns * kColumns; ++i) {
-    Vector3d const share((i % kColumns + 0.5) / kColumns, 0, (i / kColumns + 0.5) / kColumns);
+    int const column = i % kColumns, row = i / kColumns;
+    Vector3d const share((column + 0.5) / kColumns, 0, (row + 0.5) / kColumns);
     Vector3d const bottom = box.min() + share.cwiseProduct(box.sizes()) - skin * Vector3d::UnitY();
     Headroom const room = highest_room(scene, bottom, box.max().y());
     if (room.height < skin) continue;
@@ -223,11 +224,11 @@ WalkRegion default_walk_region(TriangleMesh const& mesh, PlacementOptions const&
   double const height = eye_height.value_or(0.45 * median(heights)), clearance = clearance_of(scene, options);
   Vector3d low = box.min() + Vector3d::Constant(clearance), high = box.max() - Vector3d::Constant(clearance);
   low.y() = high.y() = median(floors) + height;
-  WalkRegion const region{Eigen::AlignedBox3d(low, high)};
-  if (region.box.isEmpty())
+  Eigen::AlignedBox3d const walkable(low, high);
+  if (walkable.isEmpty())
     throw Error(ErrorCode::bad_input, {},
                 fmt::format("the scene is narrower than twice the clearance, {}: lower it", clearance));
-  return region;
+  return {walkable};
 }
 
 }  // namespace scanview

@@ -25,7 +25,7 @@ struct PlacementOptions {
   Winding winding = Winding::trusted;
   SightRules sight = {};          ///< sharp_from 0: a quarter of the region's diagonal
   std::size_t most_nodes = 1000;  ///< where they do not suffice, these leave the least
-  int steps = 2000;               ///< exchanges tried to do with one node less
+  int steps = 5000;               ///< exchanges tried to do with one node less
   /// Throws Error{usage} naming the field and its range.
   void validate() const;
 };

@@ -120,7 +120,7 @@ std::vector<SeenPoint> SceneSight::look_around(Vector3d const& eye, int directio
       Eigen::Vector3i const& t = triangles_[static_cast<std::size_t>(hit.triangle)];
       Vector3f const on_surface =
           (1 - hit.u - hit.v) * model_.vertices[t[0]] + hit.u * model_.vertices[t[1]] + hit.v * model_.vertices[t[2]];
-      SeenPoint& point = points[static_cast<std::size_t>(first + k)];
+      SeenPoint& point = points.at(first + k);
       point.position = on_surface + lift * facing;
       point.normal = facing;
       Vector3f const to_point = point.position - origin;
