@@ -8,6 +8,7 @@
 
 #include "acquire/scan_set_file.h"
 #include "base/image_file.h"
+#include "base/random.h"
 #include "tests/acquire/import_fixture.h"
 #include "tests/expect_error.h"
 #include "tests/temporary_folder.h"
@@ -223,6 +224,26 @@ TEST(Panorama, ExrRaysAreReadWithInfinityAsSky) {
   json["nodes"][0]["sky"] = {0};
   write_json(folder.path() / "panoramas.json", json);
   EXPECT_SCANVIEW_ERROR(PanoramaReader(folder.path()), ErrorCode::bad_input, "'sky'");
+}
+
+TEST(Panorama, WhateverTheRaysEveryDepthIsSound) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    CounterRandom random(seed, 0);
+    Panorama panorama;
+    int const height = 2 + static_cast<int>(random.below(12));
+    panorama.color = cv::Mat3b(height, 2 * height, cv::Vec3b::all(100));
+    panorama.ray = cv::Mat1f(height, 2 * height);
+    double const spread = 20 * random.uniform() * random.uniform();
+    for (float& ray : panorama.ray) {
+      ray = static_cast<float>(std::exp(spread * random.normal()));
+      if (random.uniform() < 0.1) ray = kMissing;
+      if (random.uniform() < 0.1) ray = std::numeric_limits<float>::infinity();
+      if (!(ray > 0)) ray = kMissing;
+    }
+    for (int side = 0; side < kCubeSides; ++side)
+      EXPECT_NO_THROW(resample_panorama(panorama, some_pose().linear(), side, 24).check());
+  }
 }
 
 TEST(Panorama, ThreadsDoNotMatter) {
