@@ -18,7 +18,7 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 alignas(64) constexpr std::array<int, kPacket> kAllValid = {-1, -1, -1, -1, -1, -1, -1, -1,
                                                             -1, -1, -1, -1, -1, -1, -1, -1};
 
-void set_ray(RTCRay16& rays, int i, Vector3f const& origin, Vector3f const& direction, float nearest) {
+void set_ray(RTCRay16& rays, int i, Vector3f const& origin, Vector3f const& direction, float nearest, float farthest) {
   rays.org_x[i] = origin.x();
   rays.org_y[i] = origin.y();
   rays.org_z[i] = origin.z();
@@ -26,7 +26,7 @@ void set_ray(RTCRay16& rays, int i, Vector3f const& origin, Vector3f const& dire
   rays.dir_y[i] = direction.y();
   rays.dir_z[i] = direction.z();
   rays.tnear[i] = nearest;
-  rays.tfar[i] = kFar;
+  rays.tfar[i] = farthest;
   rays.time[i] = 0;
   rays.mask[i] = ~0u;
   rays.id[i] = 0;
@@ -40,11 +40,49 @@ RTCIntersectContext coherent_context() {
   return context;
 }
 
+/// The point of the triangle nearest to p: inside it, or on the edge or corner whose region p is in (Ericson 2005,
+/// section 5.1.5).
+Vector3f nearest_of_triangle(Vector3f const& p, Vector3f const& a, Vector3f const& b, Vector3f const& c) {
+  Vector3f const ab = b - a, ac = c - a;
+  float const d1 = ab.dot(p - a), d2 = ac.dot(p - a);
+  if (d1 <= 0 && d2 <= 0) return a;
+  float const d3 = ab.dot(p - b), d4 = ac.dot(p - b);
+  if (d3 >= 0 && d4 <= d3) return b;
+  float const vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
+  float const d5 = ab.dot(p - c), d6 = ac.dot(p - c);
+  if (d6 >= 0 && d5 <= d6) return c;
+  float const vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
+  float const va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 >= d3 && d5 >= d6) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  return a + vb / (va + vb + vc) * ab + vc / (va + vb + vc) * ac;
+}
+
+struct NearestQuery {
+  Vector3f const* vertices;
+  Eigen::Vector3i const* triangles;
+  Vector3f point;
+};
+
+bool shrink_to_triangle(RTCPointQueryFunctionArguments* arguments) {
+  auto const& query = *static_cast<NearestQuery const*>(arguments->userPtr);
+  Eigen::Vector3i const& t = query.triangles[arguments->primID];
+  float const distance =
+      (nearest_of_triangle(query.point, query.vertices[t[0]], query.vertices[t[1]], query.vertices[t[2]]) - query.point)
+          .norm();
+  if (!(distance < arguments->query->radius)) return false;
+  arguments->query->radius = distance;
+  return true;
+}
+
 }  // namespace
 
 struct RayScene::Embree {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  Vector3f const* vertices = nullptr;  ///< in buffers of the scene
+  Eigen::Vector3i const* triangles = nullptr;
   Embree() : device(rtcNewDevice(nullptr)) {
     if (device) scene = rtcNewScene(device);
     if (!scene) throw Error(ErrorCode::io, {}, "the ray caster (Embree) does not start on this machine");
@@ -71,6 +109,8 @@ RayScene::RayScene(std::vector<Vector3f> const& vertices, std::vector<Eigen::Vec
   embree_->require_success("taking the model");
   std::memcpy(points, vertices.data(), vertices.size() * sizeof(Vector3f));
   std::memcpy(corners, triangles.data(), triangles.size() * sizeof(Eigen::Vector3i));
+  embree_->vertices = static_cast<Vector3f const*>(points);
+  embree_->triangles = static_cast<Eigen::Vector3i const*>(corners);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(embree_->scene, geometry);
   rtcReleaseGeometry(geometry);
@@ -106,7 +146,7 @@ std::array<RayHit, kPacket> RayScene::first_hits(Vector3f const& origin, RayDire
                                                  float nearest) const {
   RTCRayHit16 query;
   for (int i = 0; i < kPacket; ++i) {
-    set_ray(query.ray, i, origin, directions[i], nearest);
+    set_ray(query.ray, i, origin, directions[i], nearest, kFar);
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
@@ -120,12 +160,13 @@ std::array<RayHit, kPacket> RayScene::first_hits(Vector3f const& origin, RayDire
 }
 
 std::array<bool, kPacket> RayScene::occluded(std::array<Vector3f, kPacket> const& origins,
-                                             RayDirections const& directions, int count, float nearest) const {
+                                             RayDirections const& directions, int count, float nearest,
+                                             float farthest) const {
   RTCRay16 rays;
   alignas(64) std::array<int, kPacket> valid;
   for (int i = 0; i < kPacket; ++i) {
     valid[i] = i < count ? -1 : 0;
-    set_ray(rays, i, origins[i], directions[i], nearest);
+    set_ray(rays, i, origins[i], directions[i], nearest, farthest);
   }
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -133,6 +174,15 @@ std::array<bool, kPacket> RayScene::occluded(std::array<Vector3f, kPacket> const
   std::array<bool, kPacket> result;
   for (int i = 0; i < kPacket; ++i) result[i] = rays.tfar[i] < 0;  // Embree's mark: minus infinity
   return result;
+}
+
+float RayScene::distance(Vector3f const& point, float farthest) const {
+  NearestQuery nearest{embree_->vertices, embree_->triangles, point};
+  RTCPointQuery query{point.x(), point.y(), point.z(), 0, farthest};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(embree_->scene, &query, &context, shrink_to_triangle, &nearest);
+  return query.radius;
 }
 
 }  // namespace scanview

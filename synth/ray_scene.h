@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -30,9 +31,12 @@ class RayScene {
   /// Of what is beyond `nearest` along each ray.
   std::array<RayHit, kPacket> first_hits(Eigen::Vector3f const& origin, RayDirections const& directions,
                                          float nearest = 0) const;
-  /// Whether something is beyond `nearest` along each of the first `count` rays.
+  /// Whether something is between `nearest` and `farthest` along each of the first `count` rays.
   std::array<bool, kPacket> occluded(std::array<Eigen::Vector3f, kPacket> const& origins,
-                                     RayDirections const& directions, int count, float nearest) const;
+                                     RayDirections const& directions, int count, float nearest,
+                                     float farthest = std::numeric_limits<float>::infinity()) const;
+  /// How far it is to the nearest point of any triangle; `farthest` (finite) where nothing is nearer.
+  float distance(Eigen::Vector3f const& point, float farthest) const;
 
  private:
   struct Embree;
