@@ -15,9 +15,6 @@ using Eigen::Vector3f;
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
-alignas(64) constexpr std::array<int, kPacket> kAllValid = {-1, -1, -1, -1, -1, -1, -1, -1,
-                                                            -1, -1, -1, -1, -1, -1, -1, -1};
-
 void set_ray(RTCRay16& rays, int i, Vector3f const& origin, Vector3f const& direction, float nearest, float farthest) {
   rays.org_x[i] = origin.x();
   rays.org_y[i] = origin.y();
@@ -142,18 +139,26 @@ RayHit RayScene::first_hit(Vector3f const& origin, Vector3f const& direction) co
   return {static_cast<int>(query.hit.primID), query.hit.u, query.hit.v, query.ray.tfar};
 }
 
-std::array<RayHit, kPacket> RayScene::first_hits(Vector3f const& origin, RayDirections const& directions,
-                                                 float nearest) const {
+std::array<RayHit, kPacket> RayScene::first_hits(Vector3f const& origin, RayDirections const& directions) const {
+  std::array<Vector3f, kPacket> origins;
+  origins.fill(origin);
+  return first_hits(origins, directions, kPacket, 0);
+}
+
+std::array<RayHit, kPacket> RayScene::first_hits(std::array<Vector3f, kPacket> const& origins,
+                                                 RayDirections const& directions, int count, float nearest) const {
   RTCRayHit16 query;
+  alignas(64) std::array<int, kPacket> valid;
   for (int i = 0; i < kPacket; ++i) {
-    set_ray(query.ray, i, origin, directions[i], nearest, kFar);
+    valid[i] = i < count ? -1 : 0;
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    if (i < count) set_ray(query.ray, i, origins[i], directions[i], nearest, kFar);
   }
   RTCIntersectContext context = coherent_context();
-  rtcIntersect16(kAllValid.data(), embree_->scene, &context, &query);
+  rtcIntersect16(valid.data(), embree_->scene, &context, &query);
   std::array<RayHit, kPacket> hits;
-  for (int i = 0; i < kPacket; ++i)
+  for (int i = 0; i < count; ++i)
     if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
       hits[i] = {static_cast<int>(query.hit.primID[i]), query.hit.u[i], query.hit.v[i], query.ray.tfar[i]};
   return hits;

@@ -28,9 +28,10 @@ class RayScene {
   RayScene& operator=(RayScene const&) = delete;
 
   RayHit first_hit(Eigen::Vector3f const& origin, Eigen::Vector3f const& direction) const;
-  /// Of what is beyond `nearest` along each ray.
-  std::array<RayHit, kPacket> first_hits(Eigen::Vector3f const& origin, RayDirections const& directions,
-                                         float nearest = 0) const;
+  std::array<RayHit, kPacket> first_hits(Eigen::Vector3f const& origin, RayDirections const& directions) const;
+  /// Of the first `count` rays, each from its own origin, what they first meet beyond `nearest`.
+  std::array<RayHit, kPacket> first_hits(std::array<Eigen::Vector3f, kPacket> const& origins,
+                                         RayDirections const& directions, int count, float nearest) const;
   /// Whether something is between `nearest` and `farthest` along each of the first `count` rays.
   std::array<bool, kPacket> occluded(std::array<Eigen::Vector3f, kPacket> const& origins,
                                      RayDirections const& directions, int count, float nearest,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "base/parallel.h"
 
@@ -57,6 +58,13 @@ std::vector<Source> light_sources(int directions) {
   return sources;
 }
 
+/// What light falls on, and how much.
+struct LitPoint {
+  Vector3f position, normal;
+  Vector3f irradiance = Vector3f::Zero();
+  Vector3f* result = nullptr;  ///< where it belongs
+};
+
 /// The open sky and what blocks it.
 class Surroundings {
  public:
@@ -67,46 +75,44 @@ class Surroundings {
     fill_ = options.fill / static_cast<float>(sources_.size()) * sum.cwiseProduct(kFillTint);
   }
 
-  Vector3f irradiance(Vector3f const& position, Vector3f const& normal) const {
-    Vector3f sum = Vector3f::Zero();
-    Vector3f const origin = position + 5e-4f * radius_ * normal;
-    RayDirections directions;
-    directions.fill(normal);
-    std::array<Vector3f, kPacket> radiance;
-    int count = 0;
-    auto const cast = [&] {
-      auto const distances = blocked_at(origin, directions, count);
-      for (int i = 0; i < count; ++i) {
-        if (distances[i] == kOpen)
-          sum += directions[i].dot(normal) * radiance[i];
-        else if (options_.fill > 0)
-          sum += directions[i].dot(normal) * distances[i] / (distances[i] + options_.fill_reach) * fill_;
-      }
-      count = 0;
-    };
+  /// Of up to kPacket points: rays of one direction from neighbours take the same way, and are cast together.
+  void irradiate(std::span<LitPoint> points) const {
     for (Source const& source : sources_) {
-      if (source.direction.dot(normal) <= 0) continue;
-      directions[count] = source.direction;
-      radiance[count++] = source.radiance;
-      if (count == kPacket) cast();
+      std::array<Vector3f, kPacket> origins;
+      std::array<LitPoint*, kPacket> lit;
+      int count = 0;
+      for (LitPoint& point : points) {
+        if (source.direction.dot(point.normal) <= 0) continue;
+        origins[count] = point.position + 5e-4f * radius_ * point.normal;
+        lit[count++] = &point;
+      }
+      if (count == 0) continue;
+      auto const distances = blocked_at(origins, source.direction, count);
+      for (int i = 0; i < count; ++i) {
+        float const cosine = source.direction.dot(lit[i]->normal);
+        if (distances[i] == kOpen)
+          lit[i]->irradiance += cosine * source.radiance;
+        else if (options_.fill > 0)
+          lit[i]->irradiance += cosine * distances[i] / (distances[i] + options_.fill_reach) * fill_;
+      }
     }
-    if (count > 0) cast();
-    return options_.exposure * sum;
+    for (LitPoint& point : points) point.irradiance *= options_.exposure;
   }
 
  private:
   static constexpr float kOpen = std::numeric_limits<float>::infinity();
 
   /// How far each ray comes; where that is not asked for, 0 or kOpen.
-  std::array<float, kPacket> blocked_at(Vector3f const& origin, RayDirections const& directions, int count) const {
+  std::array<float, kPacket> blocked_at(std::array<Vector3f, kPacket> const& origins, Vector3f const& direction,
+                                        int count) const {
     float const nearest = 2e-3f * radius_;
+    RayDirections directions;
+    directions.fill(direction);
     std::array<float, kPacket> distances{};
     if (options_.fill > 0) {
-      auto const hits = scene_.first_hits(origin, directions, nearest);
+      auto const hits = scene_.first_hits(origins, directions, count, nearest);
       for (int i = 0; i < count; ++i) distances[i] = hits[i].triangle < 0 ? kOpen : hits[i].distance;
     } else {
-      std::array<Vector3f, kPacket> origins;
-      origins.fill(origin);
       auto const blocked = scene_.occluded(origins, directions, count, nearest);
       for (int i = 0; i < count; ++i) distances[i] = blocked[i] ? 0 : kOpen;
     }
@@ -191,16 +197,18 @@ void SurfaceLight::light(RayScene const& scene, float radius, Context& context, 
   Surroundings const surroundings(scene, radius, options_);
   auto const light_chunk = [&](std::size_t task) {
     std::size_t const chunk = chunks[task], end = std::min(points_.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      bool const has_normal = !points_[i].normal_sum.isZero(0);  // not of degenerate triangles only
-      Vector3f const normal = points_[i].normal_sum.normalized();
-      for (int side : {front, back}) {
+    std::vector<LitPoint> points;
+    for (int side : {front, back})
+      for (std::size_t i = chunk * kChunk; i < end; ++i) {
         if (states_[side][i].load(std::memory_order_relaxed) != State::seen) continue;
-        Vector3f const outward = side == front ? normal : Vector3f(-normal);
-        if (has_normal) light_[side][i] = surroundings.irradiance(vertices_[points_[i].vertex], outward);
         states_[side][i].store(State::lit, std::memory_order_relaxed);
+        if (points_[i].normal_sum.isZero(0)) continue;  // of degenerate triangles only
+        Vector3f const normal = (side == front ? 1.0f : -1.0f) * points_[i].normal_sum.normalized();
+        points.push_back({vertices_[points_[i].vertex], normal, Vector3f::Zero(), &light_[side][i]});
       }
-    }
+    for (std::size_t first = 0; first < points.size(); first += kPacket)
+      surroundings.irradiate(std::span(points).subspan(first, std::min<std::size_t>(kPacket, points.size() - first)));
+    for (LitPoint const& point : points) *point.result = point.irradiance;
     has_new_[chunk].store(false, std::memory_order_relaxed);
   };
   for_each_index(context, chunks.size(), light_chunk, stage);
