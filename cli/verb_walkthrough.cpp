@@ -153,6 +153,10 @@ void add_drawing_options(CLI::App* part, WalkthroughArguments& arguments) {
   part->add_option("walkthrough", arguments.folder, "The walkthrough's folder")->required();
   part->add_option("--merged", arguments.draw.merged, "Nodes that are merged, the nearest to the eye");
   part->add_option("--filling", arguments.draw.filling, "Further nodes that fill what these do not show");
+  part->add_option("--depth-tolerance", arguments.draw.depth_tolerance,
+                   "Samples of one surface differ by no more, as a share of their depth");
+  part->add_option("--parallax-tolerance", arguments.draw.parallax_tolerance_px,
+                   "and in pixels of parallax at the walking radius");
   part->add_option("--size", arguments.size, "Of a frame: width and height in pixels")->expected(2);
   part->add_option("--angle", arguments.angle, "Across a frame's width, degrees")->check(CLI::Range(1.0, 170.0));
   part->add_option("--samples", arguments.samples, "A pixel, each way")->check(CLI::Range(1, 8));
@@ -163,9 +167,9 @@ void add_drawing_options(CLI::App* part, WalkthroughArguments& arguments) {
       ->expected(2);
   part->add_option("--turn", arguments.turn, "On the way between two nodes, degrees");
   part->add_option("--memory", arguments.megabytes, "For nodes, megabytes")->check(CLI::Range(1, 1 << 20));
-  static std::map<std::string, NodeQuality> const kQualities = {{"flat", NodeQuality::flat},
-                                                                {"smooth", NodeQuality::smooth}};
-  part->add_option("--quality", arguments.draw.quality, "Of triangles: flat, smooth")
+  static std::map<std::string, NodeQuality> const kQualities = {
+      {"flat", NodeQuality::flat}, {"smooth", NodeQuality::smooth}, {"density", NodeQuality::density}};
+  part->add_option("--quality", arguments.draw.quality, "Which sample is better: flat, smooth (the paper's), density")
       ->transform(CLI::CheckedTransformer(kQualities));
   static std::map<std::string, WalkthroughOptions::Silhouettes> const kSilhouettes = {
       {"fade", WalkthroughOptions::Silhouettes::fade}, {"keep", WalkthroughOptions::Silhouettes::keep}};

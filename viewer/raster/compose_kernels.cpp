@@ -300,7 +300,9 @@ HWY_INLINE void SoftZShares(ComposedLayer const* layers, Composition const& how,
   for (std::size_t k = 0; k < group.count; ++k) {
     auto const weight =
         hn::Add(hn::Set(d, layers[group.layer[k]].weight), hn::Mul(need, hn::Load(d, group.fair_fill[k])));
-    hn::Store(hn::Mul(hn::Mul(weight, hn::Load(d, group.quality[k])), hn::Load(d, group.seen[k])), d, group.share[k]);
+    auto quality = hn::Load(d, group.quality[k]);
+    for (int i = 0; i < how.squarings; ++i) quality = hn::Mul(quality, quality);
+    hn::Store(hn::Mul(hn::Mul(weight, quality), hn::Load(d, group.seen[k])), d, group.share[k]);
   }
 }
 

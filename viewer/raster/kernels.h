@@ -53,6 +53,7 @@ struct Composition {
   float good_enough = 0, good_at_zero = 0, good_quality = 0, fair_feather = 0, least_weight = 0;
   float always = 0;  ///< views that fill count at least so much
   bool nearest = false;
+  int squarings = 0;    ///< of the quality, before it counts in the mixture: quality^(2^squarings)
   bool winner = false;  ///< of the samples that would be mixed only the one that counts most
   bool agree = false;   ///< samples are taken where the mean depth lies, instead of on each layer's own surface
   int show = 0;

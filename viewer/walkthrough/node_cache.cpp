@@ -148,7 +148,7 @@ class NodeCache final : public NodeLibrary {
       std::string failure;
       try {
         read = std::make_shared<RasterNode>(read_node_mesh(folder_ / manifest_.nodes[node].levels[level]),
-                                            options_.quality);
+                                            options_.quality, manifest_.walking_radius);
       } catch (std::exception const& error) {
         failure = "node " + manifest_.nodes[node].name + ": " + error.what();
       }

@@ -13,7 +13,7 @@ struct NodeCacheOptions {
   double seconds_ahead = 1;                  ///< how far ahead that is, at the eye's present velocity
   /// From so many walking radii on a node is drawn in the next coarser level, from twice as far in the one after it.
   double full_detail = 4;
-  NodeQuality quality = NodeQuality::smooth;
+  NodeQuality quality = NodeQuality::density;
   /// Throws Error{usage}.
   void validate() const;
 };

@@ -30,6 +30,6 @@ class NodeLibrary {
 
 /// Of nodes in memory, all in full detail.
 std::shared_ptr<NodeLibrary> make_node_library(std::vector<NodeMesh> const& nodes, double walking_radius,
-                                               NodeQuality quality = NodeQuality::smooth);
+                                               NodeQuality quality = NodeQuality::density);
 
 }  // namespace scanview

@@ -61,12 +61,23 @@ bool is_behind(Eigen::AlignedBox3d const& box, Plane const& plane) {
   return true;
 }
 
+std::vector<float> vertex_quality(NodeMesh const& node, NodeQuality quality, double walking_radius) {
+  std::vector<float> result = node.smooth_quality();
+  if (quality != NodeQuality::density) return result;
+  for (std::size_t v = 0; v < result.size(); ++v) {
+    double const times = node.vertices[v].cast<double>().norm() / walking_radius;
+    if (times > 1) result[v] /= float(times * times);
+  }
+  return result;
+}
+
 }  // namespace
 
-RasterNode::RasterNode(NodeMesh const& node, NodeQuality quality) : position_(node.position) {
+RasterNode::RasterNode(NodeMesh const& node, NodeQuality quality, double walking_radius) : position_(node.position) {
   NodeAtlas const atlas = node_atlas(node);
   texture_ = raster_texture(atlas.pyramid);
-  std::vector<float> const smooth = quality == NodeQuality::smooth ? node.smooth_quality() : std::vector<float>();
+  std::vector<float> const smooth =
+      quality == NodeQuality::flat ? std::vector<float>() : vertex_quality(node, quality, walking_radius);
   std::vector<double> distances;
   for (auto const& vertex : node.vertices) distances.push_back(vertex.cast<double>().norm());
   constexpr double kNearest = 1e-6;

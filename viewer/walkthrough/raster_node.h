@@ -8,15 +8,18 @@
 
 namespace scanview {
 
-/// A triangle's quality as it counts in a pixel: the triangle's own, or interpolated between its vertices (Darsa 1998,
-/// §6.2: "Gouraud shading can be used").
-enum class NodeQuality { flat, smooth };
+/// What says which of several nodes' samples of a surface is the better one. flat: its triangle's |N · R| (Darsa 1998,
+/// §4.4). smooth: interpolated between vertices (§6.2: "Gouraud shading can be used"). density: how many texels a unit
+/// of the surface has, |N · R| / d², d the distance from the node where it is more than the walking radius; in a
+/// mixture its fourth power counts, since blur adds up where noise would average.
+enum class NodeQuality { flat, smooth, density };
 
 /// A node as the rasteriser draws it: a mesh a side, all pictures in one atlas. Around every picture lies a gutter that
 /// shows what the neighbouring sides see there, so that filtering finds no seam.
 class RasterNode {
  public:
-  RasterNode(NodeMesh const& node, NodeQuality quality);
+  /// `walking_radius`: of all nodes that are drawn together.
+  RasterNode(NodeMesh const& node, NodeQuality quality, double walking_radius);
   Eigen::Vector3d const& position() const { return position_; }
   RasterTexture const& texture() const { return texture_; }
   std::size_t triangles() const;

@@ -27,7 +27,7 @@ struct WalkthroughOptions {
   /// to the gaps), as long as there are gaps.
   int filling = 16;
   VisibilityGaps gaps = VisibilityGaps::background;
-  NodeQuality quality = NodeQuality::smooth;
+  NodeQuality quality = NodeQuality::density;
   /// Whether a sample's distance from the silhouettes of its node counts too: texels at a silhouette hold a mixture of
   /// what is on both its sides.
   enum class Silhouettes { fade, keep } silhouettes = Silhouettes::fade;

@@ -55,7 +55,7 @@ class LibraryInMemory final : public NodeLibrary {
     std::vector<double> focal;
     for (NodeMesh const& node : nodes) {
       positions_.push_back(node.position);
-      nodes_.push_back(std::make_shared<RasterNode>(node, quality));
+      nodes_.push_back(std::make_shared<RasterNode>(node, quality, walking_radius));
       for (NodeMesh::Side const& side : node.sides) focal.push_back(side.camera.fx());
     }
     if (focal.empty()) return;
@@ -136,6 +136,7 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
   soft_z.nearest = options_.policy == MergePolicy::layering;
   Composition how = composition(soft_z, camera);
   how.agree = false;  // each side projects its own picture
+  how.squarings = options_.quality == NodeQuality::density ? 2 : 0;
   how.winner = options_.policy == MergePolicy::binary;
   how.growth = float(options_.depth_tolerance);
   how.parallax = float(options_.parallax_tolerance_px / (library_->focal_length() * library_->walking_radius()));
