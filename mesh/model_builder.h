@@ -23,11 +23,11 @@ struct ModelMaterial {
   std::optional<ModelTexture> texture;
 };
 
-/// What is on a polygon.
+/// What is on a polygon: a material (-1: none), and where the corners lie in its picture (TextureCorners), one each, or
+/// none.
 struct PolygonPaint {
-  std::int32_t material = -1;  ///< as ModelBuilder::add_material numbers them; -1: none
-  std::span<Eigen::Vector2f const> at =
-      {};  ///< where the corners lie in its picture (TextureCorners), one each, or none
+  std::int32_t material = -1;  ///< as ModelBuilder::add_material numbers them
+  std::span<Eigen::Vector2f const> at = {};
 };
 
 /// Collects a model and checks what goes in; every failure is Error{bad_input} of the file.
