@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "base/files.h"
 #include "synth/model_camera.h"
 #include "synth/texture_lookup.h"
