@@ -28,8 +28,7 @@ bool is_complete(std::string const& bytes) {
 
 namespace {
 
-cv::Mat decode_file(std::filesystem::path const& path, int flags) {
-  std::string const bytes = read_file(path);
+cv::Mat decode(std::string const& bytes, std::filesystem::path const& path, int flags) {
   if (bytes.empty()) throw Error(ErrorCode::bad_input, path, "is empty");
   if (auto gray = decode_gray_png(bytes)) {
     if (gray->empty()) throw Error(ErrorCode::bad_input, path, "is truncated or damaged");
@@ -52,14 +51,16 @@ cv::Mat decode_file(std::filesystem::path const& path, int flags) {
 
 }  // namespace
 
-cv::Mat read_image(std::filesystem::path const& path) { return decode_file(path, cv::IMREAD_UNCHANGED); }
+cv::Mat read_image(std::filesystem::path const& path) { return decode(read_file(path), path, cv::IMREAD_UNCHANGED); }
 
 cv::Mat read_gray(std::filesystem::path const& path) {
-  return decode_file(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  return decode(read_file(path), path, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
-cv::Mat3b read_color(std::filesystem::path const& path) {
-  cv::Mat image = read_image(path);
+cv::Mat3b read_color(std::filesystem::path const& path) { return decode_color(read_file(path), path); }
+
+cv::Mat3b decode_color(std::string const& bytes, std::filesystem::path const& name_in_errors) {
+  cv::Mat image = decode(bytes, name_in_errors, cv::IMREAD_UNCHANGED);
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
   if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);

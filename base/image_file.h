@@ -15,6 +15,8 @@ cv::Mat read_gray(std::filesystem::path const& path);
 
 /// 8-bit BGR of any picture: gray is repeated, alpha dropped, 16 bits divided by 257.
 cv::Mat3b read_color(std::filesystem::path const& path);
+/// The same from a file's bytes.
+cv::Mat3b decode_color(std::string const& bytes, std::filesystem::path const& name_in_errors);
 
 /// PNG or JPEG bytes; deterministic.
 std::string encode_png(cv::Mat const& image);

@@ -141,15 +141,29 @@ std::string_view GltfAccessors::buffer(std::size_t index) {
     throw Error(ErrorCode::bad_input, path_, fmt::format("buffer {} has no bytes", index));
   }
   auto const [place, is_new] = buffers_.try_emplace(index);
-  if (is_new) {
-    auto const& uri = entry.at("uri").get_ref<std::string const&>();
-    constexpr std::string_view kBase64 = ";base64,";
-    if (std::size_t const at = uri.find(kBase64); uri.starts_with("data:") && at != std::string::npos)
-      place->second = base64_decoded(std::string_view(uri).substr(at + kBase64.size()));
-    else
-      place->second = read_file(file_beside(path_, percent_decoded(uri)));
-  }
+  if (is_new) place->second = uri_bytes(entry.at("uri").get_ref<std::string const&>());
   return place->second;
+}
+
+std::string GltfAccessors::uri_bytes(std::string const& uri) const {
+  constexpr std::string_view kBase64 = ";base64,";
+  if (std::size_t const at = uri.find(kBase64); uri.starts_with("data:") && at != std::string::npos)
+    return base64_decoded(std::string_view(uri).substr(at + kBase64.size()));
+  return read_file(file_beside(path_, percent_decoded(uri)));
+}
+
+std::optional<std::string_view> GltfAccessors::part_of_buffer(std::size_t index) {
+  Json const& view = gltf_.at("bufferViews").at(index);
+  std::size_t const start = gltf_size(view, "byteOffset", 0, path_), length = gltf_size(view, "byteLength", 0, path_);
+  std::string_view const bytes = buffer(gltf_size(view, "buffer", 0, path_));
+  if (start > bytes.size() || length > bytes.size() - start) return std::nullopt;
+  return bytes.substr(start, length);
+}
+
+std::string_view GltfAccessors::view_bytes(std::size_t index) {
+  auto const bytes = part_of_buffer(index);
+  if (!bytes) throw Error(ErrorCode::bad_input, path_, fmt::format("buffer view {} ends after its bytes", index));
+  return *bytes;
 }
 
 std::vector<double> GltfAccessors::numbers(std::size_t index, std::string_view type, std::size_t components) {
@@ -168,12 +182,12 @@ std::vector<double> GltfAccessors::numbers(std::size_t index, std::string_view t
   if (element == 0) fail("is of an unknown component type");
   std::size_t const count = gltf_size(accessor, "count", 0, path_);
   std::size_t const stride = gltf_size(view, "byteStride", element, path_);
-  std::size_t const start = gltf_size(view, "byteOffset", 0, path_), length = gltf_size(view, "byteLength", 0, path_);
   std::size_t const offset = gltf_size(accessor, "byteOffset", 0, path_);
-  std::string_view const bytes = buffer(gltf_size(view, "buffer", 0, path_));
-  if (start > bytes.size() || length > bytes.size() - start || offset > length) fail("begins after its bytes end");
+  auto const part = part_of_buffer(view_index);
+  if (!part || offset > part->size()) fail("begins after its bytes end");
+  std::string_view const bytes = *part;
   if (count == 0) return {};
-  if (element > length - offset || stride < element || (count - 1) > (length - offset - element) / stride)
+  if (element > bytes.size() - offset || stride < element || (count - 1) > (bytes.size() - offset - element) / stride)
     fail("promises more than there is");
 
   bool const is_float = component == kFloat32;
@@ -182,7 +196,7 @@ std::vector<double> GltfAccessors::numbers(std::size_t index, std::string_view t
   result.reserve(count * components);
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t c = 0; c < components; ++c) {
-      double const value = load(bytes.data() + start + offset + i * stride + c * size_of(component), component);
+      double const value = load(bytes.data() + offset + i * stride + c * size_of(component), component);
       result.push_back(normalized ? std::max(value / greatest(component), -1.0) : value);
     }
   return result;
@@ -192,6 +206,13 @@ std::vector<Eigen::Vector3d> GltfAccessors::positions(std::size_t accessor) {
   std::vector<double> const values = numbers(accessor, "VEC3", 3);
   std::vector<Eigen::Vector3d> result;
   for (std::size_t i = 0; i + 2 < values.size(); i += 3) result.emplace_back(values[i], values[i + 1], values[i + 2]);
+  return result;
+}
+
+std::vector<Eigen::Vector2f> GltfAccessors::texture_coordinates(std::size_t accessor) {
+  std::vector<double> const values = numbers(accessor, "VEC2", 2);
+  std::vector<Eigen::Vector2f> result;
+  for (std::size_t i = 0; i + 1 < values.size(); i += 2) result.emplace_back(float(values[i]), float(values[i + 1]));
   return result;
 }
 

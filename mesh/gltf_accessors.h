@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,10 +25,18 @@ class GltfAccessors {
   std::vector<Eigen::Vector3d> positions(std::size_t accessor);
   /// Of type SCALAR, unsigned.
   std::vector<std::int64_t> indices(std::size_t accessor);
+  /// Of type VEC2, floats or normalized integers.
+  std::vector<Eigen::Vector2f> texture_coordinates(std::size_t accessor);
+
+  /// The bytes of a buffer view. Throws as positions does.
+  std::string_view view_bytes(std::size_t view);
+  /// What an URI holds in itself, or the bytes of the file that it names.
+  std::string uri_bytes(std::string const& uri) const;
 
  private:
   std::vector<double> numbers(std::size_t accessor, std::string_view type, std::size_t components);
   std::string_view buffer(std::size_t index);
+  std::optional<std::string_view> part_of_buffer(std::size_t view);
 
   Json const& gltf_;
   std::string_view binary_;

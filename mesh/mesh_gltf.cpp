@@ -5,12 +5,12 @@
 #include <map>
 
 #include "mesh/byte_reader.h"
-#include "mesh/equal_vertices.h"
 #include "mesh/gltf_accessors.h"
+#include "mesh/gltf_materials.h"
 #include "mesh/model_builder.h"
 
-// Khronos, "glTF 2.0 Specification": §3.5 scenes and nodes, §3.7 geometry, §3.9.4 alpha coverage, §4.4 GLB. A parser of
-// our own: tinygltf looks into images beyond their buffers and for files outside the model's folder.
+// Khronos, "glTF 2.0 Specification": §3.5 scenes and nodes, §3.7 geometry, §4.4 GLB. A parser of our
+// own: tinygltf looks into images beyond their buffers and for files outside the model's folder.
 
 namespace scanview {
 namespace {
@@ -67,7 +67,11 @@ Eigen::Affine3d parent_from_node(Json const& node) {
 class GltfReader {
  public:
   GltfReader(Json const& gltf, std::string_view binary, std::filesystem::path const& path)
-      : gltf_(gltf), path_(path), builder_(path), accessors_(gltf, binary, path) {}
+      : gltf_(gltf),
+        path_(path),
+        builder_(path),
+        accessors_(gltf, binary, path),
+        materials_(gltf, accessors_, path, builder_) {}
 
   PolygonModel read() {
     check_extensions();
@@ -83,7 +87,7 @@ class GltfReader {
     }
     if (left_out_ > 0) builder_.note(fmt::format("{} primitives of points or lines were left out", left_out_));
     if (is_posed_) builder_.note("skins and morph targets were left in the pose they were modelled in");
-    return join_equal_vertices(builder_.take());
+    return builder_.take_joined();
   }
 
  private:
@@ -157,16 +161,6 @@ class GltfReader {
     return roots;
   }
 
-  Light light(Json const& primitive) const {
-    std::size_t const index = gltf_size(primitive, "material", kNone, path_);
-    if (index == kNone) return Light::stops;
-    Json const& material = gltf_.at("materials").at(index);
-    if (material.value("alphaMode", "OPAQUE") != "OPAQUE") return Light::passes;
-    Json const none = Json::object();
-    Json const transmission = material.value("extensions", none).value("KHR_materials_transmission", none);
-    return transmission.value("transmissionFactor", 0.0) > 0 ? Light::passes : Light::stops;
-  }
-
   void add_mesh(Json const& mesh, Eigen::Affine3d const& scene_from_node) {
     struct Vertices {
       std::size_t first = 0, count = 0;
@@ -199,26 +193,29 @@ class GltfReader {
       else
         for (std::size_t i = 0; i < vertices.count; ++i) corners.push_back(std::int64_t(i));
       check_most(builder_.triangle_count() + corners.size());
+      GltfMaterials::Surface const surface = materials_.surface(primitive);
+      std::vector<Eigen::Vector2f> at;  // of the corners
+      bool const is_placed = !surface.at.empty() && surface.at.size() >= vertices.count;
       for (std::int64_t& corner : corners) {
         if (corner < 0 || std::size_t(corner) >= vertices.count)
           builder_.fail(fmt::format("a primitive names vertex {}, but has {}", corner, vertices.count));
+        if (is_placed) at.push_back(surface.at[corner]);
         corner += std::int64_t(vertices.first);
       }
-      add_triangles(corners, mode, light(primitive));
+      add_triangles(corners, mode, surface.light, {surface.number, at});
     }
     if (scene_from_node.linear().determinant() < 0) builder_.turn_from(first_triangle);
   }
 
-  void add_triangles(std::vector<std::int64_t> const& corners, std::size_t mode, Light light) {
-    if (mode == kStrip) return builder_.add_strip(corners, light);
+  void add_triangles(std::vector<std::int64_t> const& corners, std::size_t mode, Light light,
+                     PolygonPaint const& paint) {
+    if (mode == kStrip) return builder_.add_strip(corners, light, paint);
     if (mode == kFan) {
-      for (std::size_t k = 2; k < corners.size(); ++k)
-        builder_.add_polygon(std::array{corners[0], corners[k - 1], corners[k]}, light);
+      for (std::size_t k = 2; k < corners.size(); ++k) builder_.add_triangle(corners, {0, k - 1, k}, light, paint);
       return;
     }
     if (corners.size() % 3 != 0) builder_.fail("triangles whose indices are no multiple of three");
-    for (std::size_t k = 0; k < corners.size(); k += 3)
-      builder_.add_polygon(std::array{corners[k], corners[k + 1], corners[k + 2]}, light);
+    for (std::size_t k = 0; k < corners.size(); k += 3) builder_.add_triangle(corners, {k, k + 1, k + 2}, light, paint);
   }
 
   void check_most(std::size_t count) const {
@@ -229,6 +226,7 @@ class GltfReader {
   std::filesystem::path const& path_;
   ModelBuilder builder_;
   GltfAccessors accessors_;
+  GltfMaterials materials_;
   std::size_t left_out_ = 0;
   bool is_posed_ = false;
 };

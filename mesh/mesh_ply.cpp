@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mesh/model_builder.h"
+#include "mesh/ply_textures.h"
 
 namespace scanview {
 namespace {
@@ -85,15 +86,17 @@ PolygonModel model_from_ply(PlyFile const& ply, std::filesystem::path const& pat
       builder.add_color(
           cv::Vec3b(uchar(color[0]->values[row]), uchar(color[1]->values[row]), uchar(color[2]->values[row])));
   }
+  PlyTextures textures(ply, path, builder);
   if (PlyElement const* const faces = ply.find("face"); faces && faces->rows > 0) {
     PlyProperty const* const lists = find_list(*faces);
     if (!lists) builder.fail("faces without a list 'vertex_indices'");
     std::vector<std::int64_t> const indices = indices_of(*lists, builder);
     Alpha const face_alpha = alpha_of(*faces);
-    for (std::size_t row = 0; row < faces->rows; ++row)
-      builder.add_polygon(
-          std::span(indices).subspan(lists->offsets[row], lists->offsets[row + 1] - lists->offsets[row]),
-          face_alpha.at(row));
+    for (std::size_t row = 0; row < faces->rows; ++row) {
+      auto const corners =
+          std::span(indices).subspan(lists->offsets[row], lists->offsets[row + 1] - lists->offsets[row]);
+      builder.add_polygon(corners, face_alpha.at(row), textures.on_face(row, corners));
+    }
   }
   if (PlyElement const* const strips = ply.find("tristrips"); strips && strips->rows > 0) {
     PlyProperty const* const lists = find_list(*strips);
@@ -105,7 +108,7 @@ PolygonModel model_from_ply(PlyFile const& ply, std::filesystem::path const& pat
                 end = indices.begin() + std::ptrdiff_t(lists->offsets[row + 1]);
            begin != end;) {
         auto const stop = std::find(begin, end, kRestart);
-        builder.add_strip({begin, stop});
+        builder.add_strip({begin, stop}, Light::stops, textures.on_corners({begin, stop}));
         begin = stop == end ? end : stop + 1;
       }
   }

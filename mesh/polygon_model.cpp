@@ -84,6 +84,7 @@ PolygonModel read_polygon_model(fs::path const& path, Winding winding) {
   bool const inwards = winding == Winding::automatic && is_wound_inwards(model.mesh);
   if (inwards || winding == Winding::flip) {
     model.mesh = turned(std::move(model.mesh));
+    model.textures.turn_from(0);
     model.notes.push_back(inwards ? "wound inwards: all triangles were turned" : "all triangles were turned, as asked");
   }
   return model;

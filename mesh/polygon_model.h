@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mesh/model_textures.h"
 #include "mesh/triangle_mesh.h"
 
 namespace scanview {
@@ -16,6 +17,7 @@ struct PolygonModel {
   std::vector<std::int32_t>
       polygons;  ///< the polygon each triangle is a part of, ascending from 0; empty: each its own
   std::vector<std::uint8_t> transparent;  ///< 1: light passes through the triangle; empty: through none
+  ModelTextures textures;                 ///< pictures on its triangles; empty where the file has none
   std::vector<std::string> notes;         ///< what was changed or left out on the way, one line each, for a person
 
   std::size_t polygon_count() const;
@@ -29,8 +31,13 @@ enum class Winding { automatic, keep, flip };
 /// recognised by their first bytes and, where these do not tell, by the file's ending. Vertices of equal positions are
 /// joined in STL and glTF, which cannot share them, and nowhere else. Transparent are: PLY with `alpha` below 255, OBJ
 /// with a material of `d` below 1 (or `Tr` above 0) or with a `map_d`, OFF and MNI with an alpha or opacity below 1,
-/// glTF with the alpha modes BLEND and MASK or with transmission. Materials and buffers in files of their own are
-/// looked for in the model's folder and below it. Throws Error{bad_input} that names the file: damaged or cut off, of
+/// glTF with the alpha modes BLEND and MASK or with transmission. Materials, buffers and pictures in files of their own
+/// are looked for in the model's folder and below it.
+///
+/// Textures are OBJ's map_Kd (alone: Kd does not tint it), glTF's baseColorTexture and PLY's TextureFile. A picture
+/// that is missing or damaged, or a face whose texture coordinates are, is a note, and the plain colour stands in.
+/// Plain colours of materials (Kd, as sRGB; baseColorFactor) become the vertices' where the file has none of its own
+/// (`colored_by_materials`). Throws Error{bad_input} that names the file: damaged or cut off, of
 /// no kind we read, without polygons, with an index out of range or a vertex that is not finite.
 PolygonModel read_polygon_model(std::filesystem::path const& path, Winding winding = Winding::automatic);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 
 #include "base/error.h"
@@ -21,6 +22,15 @@ Eigen::Vector3f linear_from_hex(std::string const& hex) {
   if (!good) throw Error(ErrorCode::usage, {}, fmt::format("colour '{}': expected #rrggbb", hex));
   auto const channel = [&](int shift) { return static_cast<float>(linear_from_srgb8()[value >> shift & 0xff]); };
   return {channel(16), channel(8), channel(0)};
+}
+
+Eigen::Vector3f linear_from_bgr(cv::Vec3b const& bgr) {
+  static std::array<float, 256> const linear = [] {
+    std::array<float, 256> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) table[i] = static_cast<float>(linear_from_srgb8()[i]);
+    return table;
+  }();
+  return {linear[bgr[2]], linear[bgr[1]], linear[bgr[0]]};
 }
 
 cv::Vec3d bgr_from_linear(Eigen::Vector3f const& linear) {

@@ -11,6 +11,9 @@ inline constexpr char const* kSkyColor = "#606e80";
 /// Linear R G B of "#rrggbb" (sRGB); throws Error{usage} for anything else.
 Eigen::Vector3f linear_from_hex(std::string const& hex);
 
+/// Linear R G B of an 8-bit sRGB colour in OpenCV's order (B G R).
+Eigen::Vector3f linear_from_bgr(cv::Vec3b const& bgr);
+
 /// sRGB of linear R G B, 0 to 255 and not yet rounded, in OpenCV's order (B G R); clipped.
 cv::Vec3d bgr_from_linear(Eigen::Vector3f const& linear);
 

@@ -70,12 +70,17 @@ void ModelCameraOptions::validate() const {
 }
 
 ModelCamera::ModelCamera(TriangleMesh model, ModelCameraOptions const& options, Context& context)
-    : mesh_(std::move(model)),
+    : ModelCamera(PolygonModel{std::move(model), {}, {}, {}, {}}, options, context) {}
+
+ModelCamera::ModelCamera(PolygonModel model, ModelCameraOptions const& options, Context& context)
+    : mesh_(std::move(model.mesh)),
+      textures_(std::move(model.textures)),
       options_(options),
-      paint_(mesh_.triangles, mesh_.colors),
+      paint_(mesh_.triangles, mesh_.colors, textures_),
       background_(linear_from_hex(options.background)) {
   options_.validate();
   mesh_.check();
+  textures_.check(mesh_.triangles.size());
   context.check_cancelled();
   Eigen::AlignedBox3d box;
   for (auto const& t : mesh_.triangles)
@@ -88,7 +93,7 @@ ModelCamera::ModelCamera(TriangleMesh model, ModelCameraOptions const& options, 
   scene_.emplace(mesh_.vertices, mesh_.triangles);
   if (options_.light == ModelCameraOptions::Light::painted) return;
   options_.surface.fill_reach *= static_cast<float>(radius);
-  light_.emplace(mesh_.vertices, mesh_.triangles, mesh_.colors, options_.surface);
+  light_.emplace(mesh_.vertices, mesh_.triangles, paint_, options_.surface);
   // A fine model has details that shade each other at smaller distances.
   light_radius_ = static_cast<float>(std::clamp(40 * median_edge(mesh_), 4e-3 * radius, radius));
 }

@@ -5,7 +5,7 @@
 
 #include "acquire/captured_node.h"
 #include "base/context.h"
-#include "mesh/triangle_mesh.h"
+#include "mesh/polygon_model.h"
 #include "synth/linear_color.h"
 #include "synth/ray_scene.h"
 #include "synth/surface_light.h"
@@ -13,7 +13,8 @@
 namespace scanview {
 
 struct ModelCameraOptions {
-  /// baked: a diffuse light with shadows that is fixed to the model (SurfaceLight); painted: its colours as they are.
+  /// baked: a diffuse light with shadows that is fixed to the model (SurfaceLight); painted: its colours and textures
+  /// as they are.
   enum class Light { baked, painted } light = Light::baked;
   int samples_side = 4;                ///< rays a side of a pixel for colour, 1 to 64
   std::string background = kSkyColor;  ///< of what no ray meets, sRGB
@@ -31,7 +32,9 @@ struct ModelCameraOptions {
 /// of fine models takes longer than the pictures. One call of capture or picture at a time.
 class ModelCamera {
  public:
-  /// Throws Error{usage} for bad options, Error{bad_input} for a model without triangles or extent.
+  /// With the model's textures; light that passes through triangles is stopped. Throws Error{usage} for bad options,
+  /// Error{bad_input} for a model without triangles or extent.
+  ModelCamera(PolygonModel model, ModelCameraOptions const& options, Context& context);
   ModelCamera(TriangleMesh model, ModelCameraOptions const& options, Context& context);
   ModelCamera(ModelCamera const&) = delete;
   ModelCamera& operator=(ModelCamera const&) = delete;
@@ -62,6 +65,7 @@ class ModelCamera {
   Eigen::Vector3d corner(int triangle, int which) const;
 
   TriangleMesh mesh_;  // about origin_
+  ModelTextures textures_;
   ModelCameraOptions options_;
   Eigen::Vector3d origin_;
   std::optional<RayScene> scene_;

@@ -129,8 +129,8 @@ class Surroundings {
 }  // namespace
 
 SurfaceLight::SurfaceLight(std::vector<Vector3f> const& vertices, std::vector<Vector3i> const& triangles,
-                           std::vector<cv::Vec3b> const& colors, SurfaceLightOptions const& options)
-    : vertices_(vertices), triangles_(triangles), paint_(triangles, colors), options_(options), corners_(triangles) {
+                           SurfacePaint const& paint, SurfaceLightOptions const& options)
+    : vertices_(vertices), triangles_(triangles), paint_(paint), options_(options), corners_(triangles) {
   gather_points();
   has_new_ = std::vector<std::atomic<bool>>((points_.size() + kChunk - 1) / kChunk);
   for (int side : {front, back}) {
@@ -217,6 +217,10 @@ void SurfaceLight::light(RayScene const& scene, float radius, Context& context, 
 Vector3f SurfaceLight::leaving(RayHit const& hit, Vector3f const& direction) const {
   auto const& light = light_[side_seen(hit.triangle, direction)];
   Vector3i const &c = corners_[hit.triangle], &t = triangles_[hit.triangle];
+  if (paint_.has_texture(hit.triangle)) {
+    Vector3f const arriving = (1 - hit.u - hit.v) * light[c[0]] + hit.u * light[c[1]] + hit.v * light[c[2]];
+    return paint_.at(hit).cwiseProduct(arriving);
+  }
   auto const at = [&](int i) -> Vector3f { return paint_.at_vertex(t[i]).cwiseProduct(light[c[i]]); };
   return (1 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2);
 }

@@ -31,7 +31,10 @@ class SurfaceLight {
   /// `vertices` and `triangles` are those of `scene` and must outlive this; `colors` as in TriangleMesh, or empty for
   /// pale plaster.
   SurfaceLight(std::vector<Eigen::Vector3f> const& vertices, std::vector<Eigen::Vector3i> const& triangles,
-               std::vector<cv::Vec3b> const& colors, SurfaceLightOptions const& options = {});
+               std::vector<cv::Vec3b> const& colors, SurfaceLightOptions const& options = {})
+      : SurfaceLight(vertices, triangles, SurfacePaint(triangles, colors), options) {}
+  SurfaceLight(std::vector<Eigen::Vector3f> const& vertices, std::vector<Eigen::Vector3i> const& triangles,
+               SurfacePaint const& paint, SurfaceLightOptions const& options);
 
   /// Notes that a triangle is seen by a ray of this direction. May be called from several threads.
   void mark_seen(int triangle, Eigen::Vector3f const& direction);

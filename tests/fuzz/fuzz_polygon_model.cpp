@@ -15,6 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(std::uint8_t const* data, std::size_t size
     auto const model = scanview::parse_polygon_model({reinterpret_cast<char const*>(data) + 1, size - 1},
                                                      kNames[data[0] % kNames.size()]);
     model.mesh.check();
+    model.textures.check(model.mesh.triangles.size());
     (void)scanview::is_wound_inwards(model.mesh);
   } catch (scanview::Error const&) {
     // Refusing is one of the two right answers.

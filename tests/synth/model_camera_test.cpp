@@ -235,7 +235,7 @@ TEST(ModelCamera, BadOptionsAndCamerasAreRefused) {
   refused([](auto& o) { o.surface.exposure = NAN; }, "surface.exposure");
   refused([](auto& o) { o.surface.fill = 2; }, "surface.fill");
   refused([](auto& o) { o.surface.fill_reach = 0; }, "surface.fill_reach");
-  EXPECT_SCANVIEW_ERROR(ModelCamera({}, {}, context), ErrorCode::bad_input, "without triangles");
+  EXPECT_SCANVIEW_ERROR(ModelCamera(TriangleMesh{}, {}, context), ErrorCode::bad_input, "without triangles");
   ModelCamera camera(make_cube(), {}, context);
   EXPECT_SCANVIEW_ERROR(camera.capture(Camera::orthographic(8, 8, 1, 1, 4, 4), Isometry3d::Identity(), context),
                         ErrorCode::usage, "perspective");
