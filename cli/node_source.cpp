@@ -18,21 +18,25 @@ namespace scanview {
 namespace fs = std::filesystem;
 namespace {
 
-TriangleMesh read_scene_model(std::string const& scene, NodeSourceOptions const& options, Context& context) {
-  if (is_builtin_model(scene)) return builtin_model(scene);
+PolygonModel read_scene_model(std::string const& scene, NodeSourceOptions const& options, Context& context) {
+  if (is_builtin_model(scene)) {
+    PolygonModel model;
+    model.mesh = builtin_model(scene);
+    return model;
+  }
   Winding const winding = options.winding == "keep"   ? Winding::keep
                           : options.winding == "flip" ? Winding::flip
                                                       : Winding::automatic;
   PolygonModel model = read_polygon_model(scene, winding);
   for (auto const& note : model.notes) context.log(note);
-  return std::move(model.mesh);
+  return model;
 }
 
 class ModelScene final : public NodeSource {
  public:
-  ModelScene(TriangleMesh model, NodeSourceOptions const& options, Places places, Context& context)
+  ModelScene(PolygonModel model, NodeSourceOptions const& options, Places places, Context& context)
       : options_(options) {
-    if (places == Places::chosen) choose(model, context);
+    if (places == Places::chosen) choose(model.mesh, context);
     ModelCameraOptions camera;
     camera.light = options.light == "painted" ? ModelCameraOptions::Light::painted : ModelCameraOptions::Light::baked;
     camera_.emplace(std::move(model), camera, context);
