@@ -67,6 +67,13 @@ class LibraryInMemory final : public NodeLibrary {
   double focal_length() const override { return focal_length_; }
   std::shared_ptr<RasterNode const> get(std::size_t node, double, Wait) override { return nodes_[node]; }
   std::vector<std::string> failures() const override { return {}; }
+  bool has_failed(std::size_t) const override { return false; }
+  NodeTraffic traffic() const override {
+    NodeTraffic traffic;
+    traffic.nodes = nodes_.size();
+    for (auto const& node : nodes_) traffic.bytes += node->bytes();
+    return traffic;
+  }
   void follow(Eigen::Vector3d const&) override {}
 
  private:
@@ -127,6 +134,7 @@ std::vector<UsedNode> WalkthroughRenderer::nodes_by_distance(Eigen::Vector3d con
 std::shared_ptr<RasterNode const> WalkthroughRenderer::get(UsedNode const& used) {
   auto node = library_->get(used.node, used.distance,
                             patience_ == Patience::waits ? NodeLibrary::Wait::yes : NodeLibrary::Wait::no);
+  complete_ = complete_ && (node || library_->has_failed(used.node));
   return node;
 }
 
@@ -219,10 +227,7 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
   std::size_t next = 0;
   for (; next < all.size() && merged.size() < std::size_t(options_.merged); ++next) {
     auto node = get(all[next]);
-    if (!node) {
-      complete_ = false;
-      continue;
-    }
+    if (!node) continue;
     used_.push_back(all[next]);
     merged.push_back({std::move(node), 0});
   }
@@ -255,10 +260,7 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
   for (std::size_t filled = 0; open && next < all.size() && filled < std::size_t(options_.filling); ++next) {
     UsedNode used = all[next];
     auto node = get(used);
-    if (!node) {
-      complete_ = false;
-      continue;
-    }
+    if (!node) continue;
     open = fill({std::move(node), 0}, used, camera, scene_from_camera, frame);
     if (open) used_.push_back(used);
     ++filled;
