@@ -22,6 +22,11 @@ void HeldKeys::feed(WindowEvent const& event) {
   }
 }
 
+bool HeldKeys::is_held(int key) const {
+  auto const known = keys_.find(key);
+  return known != keys_.end() && known->second.held;
+}
+
 std::map<int, double> HeldKeys::take(double now) {
   std::map<int, double> seconds;
   for (auto it = keys_.begin(); it != keys_.end();) {

@@ -13,6 +13,7 @@ class HeldKeys {
   static constexpr double kTouchSeconds = 0.05;
   /// Takes the keys among the events; others change nothing.
   void feed(WindowEvent const& event);
+  bool is_held(int key) const;
   bool any() const { return !keys_.empty(); }
   /// For how many seconds each key was held since the last call, until `now` (on the clock of WindowEvent::seconds). A
   /// key that was released is in the next answer for the last time.

@@ -24,8 +24,8 @@ struct NodeMap {
   std::vector<std::array<Eigen::Vector2d, 2>> edges;  ///< of the box
   Eigen::Vector2d eye{0, 0};
   std::array<Eigen::Vector2d, 2> view = {};  ///< ends of the rays at the left and at the right of the picture
-  double bar = 0;                       ///< a round length of the scene, to show the scale by
-  double bar_width = 0;                 ///< of the drawing
+  double bar = 0;                            ///< a round length of the scene, to show the scale by
+  double bar_width = 0;                      ///< of the drawing
 
   /// The node whose dot is nearest to a place and within `reach` of it; dots.size() where there is none.
   std::size_t nearest(Eigen::Vector2d const& at, double reach) const;

@@ -113,6 +113,7 @@ void WindowLoop::handle(WindowEvent const& event) {
     keys_.feed(event);
     return;
   }
+  if (event.kind == Kind::key && keys_.is_held(event.key)) return;  // the keyboard repeats
   // The panel lights up what the pointer is over; elsewhere a move alone changes nothing.
   if (event.kind != Kind::move || !inside || was_beside_) panel_frames_ = kSettle;
   was_beside_ = !inside;

@@ -48,7 +48,7 @@ class WindowLoop {
   /// Around the picture, and what its buttons ask for.
   virtual void draw_panel() = 0;
   virtual void press(int key) = 0;
-  /// Keys that do something for as long as they are held; press() is called for them, too.
+  /// Keys that do something for as long as they are held; press() is called for them once, without repeats.
   virtual bool holds(int) const { return false; }
   /// Before each frame while such keys are held: for how many seconds each was since the last time.
   virtual void hold(std::map<int, double> const&) {}
