@@ -113,8 +113,7 @@ void add_view(CLI::App& app, Session& session) {
   struct Arguments {
     fs::path path, visibility, cameras;
     WindowOptions options;
-    std::string back_end = "auto", up = "y";
-    MergePolicy policy = WalkthroughOptions().policy;
+    std::string back_end = "auto", up = "y", policy = to_string(WalkthroughOptions().policy);
   };
   static std::map<std::string, UpAxis> const kAxes = {{"x", UpAxis::x},        {"y", UpAxis::y},
                                                       {"z", UpAxis::z},        {"-x", UpAxis::minus_x},
@@ -147,8 +146,7 @@ void add_view(CLI::App& app, Session& session) {
   std::vector<CLI::Option*> const of_walkthroughs = {
       verb->add_option("--policy", arguments->policy,
                        "How nodes are merged at first: layering, binary, weighted or positional")
-          ->transform(CLI::CheckedTransformer(kPolicies))
-          ->default_str(to_string(arguments->policy))};
+          ->check(CLI::IsMember(kPolicies))};
   for (CLI::Option* const option : of_walkthroughs) option->group("Of a walkthrough");
   verb->footer("A set:\n" + window_help() + "\n\nA model:\n" + model_window_help() + "\n\nA walkthrough:\n" +
                walk_window_help());
@@ -169,7 +167,7 @@ void add_view(CLI::App& app, Session& session) {
       if (viewed == Viewed::walkthrough) {
         WalkWindowOptions of_walkthrough;
         static_cast<BasicWindowOptions&>(of_walkthrough) = options;
-        of_walkthrough.rendering.policy = arguments->policy;
+        of_walkthrough.rendering.policy = kPolicies.at(arguments->policy);
         view_walkthrough_folder(arguments->path, of_walkthrough, session);
         return;
       }

@@ -31,7 +31,9 @@ WalkthroughOptions with_walk_look(WalkthroughOptions options, WalkLook const& lo
   options.policy = look.policy;
   options.merged = look.merged;
   options.filling = look.fills ? look.filling : 0;
-  options.gaps = look.gaps == GapLook::interpolated ? VisibilityGaps::interpolated : VisibilityGaps::background;
+  // False colours that run into gaps would say that nodes show what none does.
+  bool const interpolates = look.gaps == GapLook::interpolated && look.show != Show::sources;
+  options.gaps = interpolates ? VisibilityGaps::interpolated : VisibilityGaps::background;
   options.silhouettes = look.fades ? Silhouettes::fade : Silhouettes::keep;
   options.show = look.show;
   return options;

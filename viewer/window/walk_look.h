@@ -29,7 +29,7 @@ struct WalkLook {
   bool operator==(WalkLook const&) const = default;
 };
 WalkLook walk_look_of(WalkthroughOptions const& options);
-/// `options` with this look.
+/// `options` with this look. In false colour gaps are never interpolated.
 WalkthroughOptions with_walk_look(WalkthroughOptions options, WalkLook const& look);
 /// The commands that change a look, and what there is to say about it; nothing for others.
 std::optional<std::string> change_walk_look(WalkLook& look, Command command);

@@ -6,13 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/srgb.h"
 #include "viewer/view_based/view_based_renderer.h"
 
 namespace scanview {
 namespace {
 
-ImU32 color(Eigen::Vector3f const& rgb, float alpha = 1) {
-  return ImGui::GetColorU32(ImVec4(rgb.x(), rgb.y(), rgb.z(), alpha));
+/// A node's false colour as pictures show it.
+ImU32 hue_of(std::size_t node, float alpha = 1) {
+  auto const shown = [hue = view_hue(node)](int c) { return static_cast<float>(srgb_from_linear(hue[c])); };
+  return ImGui::GetColorU32(ImVec4(shown(0), shown(1), shown(2), alpha));
 }
 
 std::string length_of(double length, Unit unit) {
@@ -40,10 +43,9 @@ void draw_dot(ImDrawList& list, MapCanvas const& canvas, NodeMap::Dot const& dot
   }
   auto const weight = static_cast<float>(dot.weight);
   float const size = canvas.scale * (dot.drawn ? 3.5F + 2.5F * weight : 2.5F);
-  Eigen::Vector3f const grey(0.6F, 0.62F, 0.66F);
   // Those that fill are drawn, but fainter than those that are merged.
   float const alpha = dot.weight > 0 ? 0.6F + 0.4F * std::sqrt(weight) : 0.45F;
-  list.AddCircleFilled(at, size, dot.drawn ? color(view_hue(dot.node), alpha) : color(grey, 0.8F));
+  list.AddCircleFilled(at, size, dot.drawn ? hue_of(dot.node, alpha) : IM_COL32(153, 158, 168, 200));
   if (dot.weight > 0) list.AddCircle(at, size + 1, IM_COL32(255, 255, 255, 255));
 }
 
@@ -157,7 +159,7 @@ void draw_used(WalkPanelContent const& content, float scale) {
     float const side = ImGui::GetTextLineHeight();
     ImVec2 const corner = ImGui::GetCursorScreenPos();
     ImGui::GetWindowDrawList()->AddCircleFilled(ImVec2(corner.x + 0.5F * side, corner.y + 0.5F * side), 4 * scale,
-                                                color(view_hue(used.node)));
+                                                hue_of(used.node));
     ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 1.4F * side);
     ImGui::TextUnformatted(used_node_text(content, used).c_str());
   }
@@ -167,7 +169,7 @@ void draw_used(WalkPanelContent const& content, float scale) {
 
 std::string used_node_text(WalkPanelContent const& content, UsedNode const& used) {
   std::string const share = used.weight > 0 ? fmt::format("{:3.0f} %", 100 * used.weight) : "fills";
-  return fmt::format("{} {} {:>7} {:6} tri.", content.names.at(used.node), share,
+  return fmt::format("{} {} {:>8} {:6} tri.", content.names.at(used.node), share,
                      length_of(used.distance, content.unit), used.triangles);
 }
 
@@ -194,7 +196,7 @@ WalkPanelAnswer draw_walk_panel(PanelFrame& frame, WalkPanelContent& content, Ov
     for (auto const& line : walk_frame_text(content)) ImGui::TextUnformatted(line.c_str());
     if (content.failures.empty()) return;
     ImGui::Separator();
-    ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "nodes that cannot be shown: %zu", content.failures.size());
+    ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "nodes that cannot be read: %zu", content.failures.size());
     for (auto const& line : content.failures) ImGui::TextWrapped("%s", line.c_str());
   });
   return answer;

@@ -30,7 +30,7 @@ struct WalkPanelContent : PanelStatus {
   int frames_between = 24;
 };
 
-/// "003  62 %  0.84 m  12345 tri.": a node that was drawn, its share, its distance, and its triangles.
+/// "003  62 %  0.842 m  12345 tri.": a node that was drawn, its share, its distance, and its triangles.
 std::string used_node_text(WalkPanelContent const& content, UsedNode const& used);
 /// Lines about the frame that is shown: what is uncovered, the stages' times, the nodes in memory.
 std::vector<std::string> walk_frame_text(WalkPanelContent const& content);

@@ -137,7 +137,6 @@ class WalkWindow final : public WindowLoop {
     Camera const shown = camera(viewport_.width, viewport_.height);
     double const width_deg = 360 / std::numbers::pi * std::atan(0.5 * shown.width() / shown.fx());
     content_.map = node_map(renderer_.library(), content_.used, manifest_.walk, control_, width_deg);
-    content_.traffic = renderer_.library().traffic();
     content_.is_free = control_.is_free;
     content_.keyframes = keyframes_.size();
     if (keyframes_.size() > 0)
