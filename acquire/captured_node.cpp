@@ -1,10 +1,53 @@
 #include "acquire/captured_node.h"
 
+#include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "base/error.h"
+#include "base/srgb.h"
 
 namespace scanview {
+namespace {
+
+RangeImage half_image(RangeImage const& image) {
+  Camera const& camera = image.camera;
+  RangeImage half =
+      empty_range_image(camera.resized(std::max(1, camera.width() / 2), std::max(1, camera.height() / 2)));
+  half.color.create(half.depth.size());
+  auto const& linear = linear_from_srgb8();
+  constexpr float kSameSurface = 1.02F;
+  for (int y = 0; y < half.depth.rows; ++y)
+    for (int x = 0; x < half.depth.cols; ++x) {
+      double light[3] = {}, inverse = 0, sigma = 0;
+      float nearest = std::numeric_limits<float>::infinity();
+      int pixels = 0, depths = 0;
+      auto const for_each = [&](auto const& act) {
+        for (int v = 2 * y; v < std::min(2 * y + 2, image.depth.rows); ++v)
+          for (int u = 2 * x; u < std::min(2 * x + 2, image.depth.cols); ++u) act(u, v);
+      };
+      for_each([&](int u, int v) {
+        ++pixels;
+        for (int c = 0; c < 3; ++c) light[c] += linear[image.color(v, u)[c]];
+        if (image.has_depth(u, v)) nearest = std::min(nearest, image.depth(v, u));
+      });
+      for_each([&](int u, int v) {
+        if (!image.has_depth(u, v) || image.depth(v, u) > kSameSurface * nearest) return;
+        inverse += 1 / double(image.depth(v, u));
+        sigma = std::max(sigma, double(image.sigma(v, u)));
+        ++depths;
+      });
+      for (int c = 0; c < 3; ++c)
+        half.color(y, x)[c] = cv::saturate_cast<uchar>(255 * srgb_from_linear(light[c] / pixels));
+      half.classes(y, x) = depths > 0 ? static_cast<uchar>(PixelClass::object) : image.classes(2 * y, 2 * x);
+      if (depths == 0) continue;
+      half.depth(y, x) = float(depths / inverse);
+      half.sigma(y, x) = float(sigma);
+    }
+  return half;
+}
+
+}  // namespace
 
 void CapturedNode::check() const {
   if (sides.empty()) throw std::logic_error("a node without sides");
@@ -15,6 +58,16 @@ void CapturedNode::check() const {
     double const scale = 1 + position.norm();
     if ((side.eye() - position).norm() > 1e-9 * scale) throw std::logic_error("sides of a node with several eyes");
   }
+}
+
+CapturedNode half_resolution(CapturedNode const& node) {
+  CapturedNode half{node.name, node.position, {}};
+  for (View const& side : node.sides) {
+    View smaller = side;
+    smaller.image = half_image(side.image);
+    half.sides.push_back(std::move(smaller));
+  }
+  return half;
 }
 
 std::string cube_side_name(int side) {

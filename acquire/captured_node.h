@@ -18,6 +18,11 @@ struct CapturedNode {
   void check() const;
 };
 
+/// The same in pictures of half the size (rounded down, at least one pixel): colours are means in linear light, depths
+/// means in 1 / z of those of four pixels that belong to the nearest's surface, which is taken to be within a fiftieth
+/// of its depth.
+CapturedNode half_resolution(CapturedNode const& node);
+
 /// The sides of a cube about a point, its edges parallel to the scene's axes (Greene 1986; Darsa 1998, §4.1): each
 /// picture is square and 90 degrees wide, the outer edges of its outermost pixels on the edges of the cube.
 inline constexpr int kCubeSides = 6;

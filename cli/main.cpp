@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   for (AddVerb const add : {add_acquire, add_calibrate, add_import, add_register, add_mesh, add_view, add_visibility,
-                            add_render, add_evaluate, add_synth, add_run, add_export, add_info})
+                            add_walkthrough, add_render, add_evaluate, add_synth, add_run, add_export, add_info})
     add(app, session);
   try {
     app.parse(argc, argv);

@@ -7,7 +7,6 @@
 #include <span>
 #include <tuple>
 
-#include "base/parallel.h"
 #include "base/random.h"
 
 namespace scanview {
@@ -46,8 +45,8 @@ std::uint64_t count_without(std::uint64_t const* a, std::uint64_t const* b, std:
 /// Chosen sets and what they cover, with a weight for what each group is missing.
 class Search {
  public:
-  Search(GroupCoverProblem const& problem, Context& context)
-      : problem_(problem), context_(context), row_(problem.groups * problem.words), nothing_(problem.words) {
+  explicit Search(GroupCoverProblem const& problem)
+      : problem_(problem), row_(problem.groups * problem.words), nothing_(problem.words) {
     restart({});
   }
 
@@ -77,11 +76,12 @@ class Search {
   /// The lack without each of the chosen sets.
   std::vector<Lack> lacks_without_one() const {
     std::vector<Lack> lacks(chosen_.size());
-    for_each_index(context_, chosen_.size(), [&](std::size_t i) {
-      Words left = left_;
+    Words left;
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      left = left_;
       for (std::size_t w = 0; w < row_; ++w) left[w] |= members(chosen_[i])[w] & once_[w];
       for (std::size_t group = 0; group < problem_.groups; ++group) add(lacks[i], group, left, nothing_.data());
-    });
+    }
     return lacks;
   }
 
@@ -110,28 +110,24 @@ class Search {
         open.push_back(group);
     std::uint64_t const helped_left =
         helped ? count_without(left_.data() + *helped * problem_.words, nothing_.data(), problem_.words) : 0;
-    constexpr std::size_t kSetsATask = 64;
-    struct Best {
-      Lack lack = kWorst;
-      std::size_t set = 0;
-    };
-    std::vector<Best> found((problem_.sets + kSetsATask - 1) / kSetsATask);
-    for_each_index(context_, found.size(), [&](std::size_t task) {
-      for (std::size_t set = task * kSetsATask; set < std::min(problem_.sets, (task + 1) * kSetsATask); ++set) {
-        if (std::ranges::find(refused, set) != refused.end()) continue;
-        Lack lack;
-        if (helped && count_without(left_.data() + *helped * problem_.words, members(set) + *helped * problem_.words,
-                                    problem_.words) == helped_left)
-          continue;
-        for (std::size_t const group : open) {
-          add(lack, group, left_, members(set) + group * problem_.words);
-          if (lack.missing > found[task].lack.missing) break;
-        }
-        if (lack < found[task].lack) found[task] = {lack, set};
+    std::size_t best = 0;
+    Lack least = kWorst;
+    for (std::size_t set = 0; set < problem_.sets; ++set) {
+      if (std::ranges::find(refused, set) != refused.end()) continue;
+      if (helped && count_without(left_.data() + *helped * problem_.words, members(set) + *helped * problem_.words,
+                                  problem_.words) == helped_left)
+        continue;
+      Lack lack;
+      for (std::size_t const group : open) {
+        add(lack, group, left_, members(set) + group * problem_.words);
+        if (lack.missing > least.missing) break;
       }
-    });
-    auto const best = std::ranges::min_element(found, [](Best const& a, Best const& b) { return a.lack < b.lack; });
-    chosen_.push_back(best->set);
+      if (lack < least) {
+        least = lack;
+        best = set;
+      }
+    }
+    chosen_.push_back(best);
     count();
   }
 
@@ -162,7 +158,6 @@ class Search {
   }
 
   GroupCoverProblem const& problem_;
-  Context& context_;
   std::size_t row_;
   Words nothing_;
   Sets chosen_;
@@ -178,10 +173,11 @@ std::size_t least(std::vector<Lack> const& lacks) {
 /// Tries to cover with as many sets as are chosen; how that ended is in search.lack(). Each step takes away the set
 /// that is missed the least and adds the best other; groups that stay uncovered weigh more with every step, which leads
 /// out of every local optimum (row weighting: Gao, Yao, Weise, Li 2015).
-void exchange(Search& search, int steps, CounterRandom random) {
+void exchange(Search& search, int steps, CounterRandom random, Context const& context) {
   constexpr std::size_t kTabu = 3;  // steps for which what was just taken away stays away
   std::vector<std::size_t> refused;
   for (int step = 0; step < steps && search.lack().missing > 0; ++step) {
+    context.check_cancelled();
     auto lacks = search.lacks_without_one();
     if (lacks.size() > 1 && step > 0) lacks.back() = kWorst;  // just added
     std::size_t const leaving = least(lacks);
@@ -217,8 +213,8 @@ void descend(Search& search) {
 
 }  // namespace
 
-GroupCover cover_groups(GroupCoverProblem const& problem, std::size_t most_sets, int steps, Context& context) {
-  Search search(problem, context);
+GroupCover cover_groups(GroupCoverProblem const& problem, std::size_t most_sets, int steps, Context const& context) {
+  Search search(problem);
   GroupCover cover;
   for (Lack current = search.lack(); current.missing > 0;) {
     search.add_best({});
@@ -234,7 +230,7 @@ GroupCover cover_groups(GroupCoverProblem const& problem, std::size_t most_sets,
     while (covering.size() > 1) {
       search.restart(covering);
       search.remove(least(search.lacks_without_one()));
-      exchange(search, steps, CounterRandom(context.seed, covering.size()));
+      exchange(search, steps, CounterRandom(context.seed, covering.size()), context);
       if (search.lack().missing > 0) break;
       covering = search.chosen();
     }

@@ -32,9 +32,10 @@ struct GroupCover {
 /// Few sets that cover every group up to `spare`. First greedily: each set is the one that leaves the least (the bits
 /// of the number of items beyond the spare ones, summed over groups; then the uncovered items; then the first). Then
 /// with one set less, for as long as `steps` exchanges of a set find a cover: groups that stay uncovered gain weight
-/// (row weighting: Gao, Yao, Weise, Li 2015). Last, exchanges that lower the uncovered items. Deterministic, for any
-/// number of threads. Cost: a step looks at the members of all sets in groups with uncovered items, and at all members
-/// of chosen sets.
-GroupCover cover_groups(GroupCoverProblem const& problem, std::size_t most_sets, int steps, Context& context);
+/// (row weighting: Gao, Yao, Weise, Li 2015). Last, exchanges that lower the uncovered items. Deterministic. Cost: a
+/// step looks at the members of all sets in groups with uncovered items, and at all members of chosen sets; a
+/// millisecond or two for some 500 sets and groups, so one thread does it all. Of the context: the seed, and
+/// cancelling.
+GroupCover cover_groups(GroupCoverProblem const& problem, std::size_t most_sets, int steps, Context const& context);
 
 }  // namespace scanview

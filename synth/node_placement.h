@@ -22,7 +22,7 @@ struct PlacementOptions {
   double spacing = 0;           ///< of the test eyes, scene units; 0: such that some 450 may walk
   int directions = 1024;        ///< looked along from each test eye
   double greatest_gap = 0.002;  ///< the share of all directions from any eye that may stay unseen
-  Winding winding = Winding::trusted;
+  SceneWinding winding = SceneWinding::trusted;
   SightRules sight = {};          ///< sharp_from 0: a quarter of the region's diagonal
   std::size_t most_nodes = 1000;  ///< where they do not suffice, these leave the least
   int steps = 5000;               ///< exchanges tried to do with one node less

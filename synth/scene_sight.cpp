@@ -49,7 +49,7 @@ void SightRules::validate() const {
     throw Error(ErrorCode::usage, {}, fmt::format("sharp_from is {}, no length", sharp_from));
 }
 
-SceneSight::SceneSight(TriangleMesh const& scene, Winding winding)
+SceneSight::SceneSight(TriangleMesh const& scene, SceneWinding winding)
     : model_(centered(scene)),
       triangles_(scene.triangles),
       winding_(winding),
@@ -78,12 +78,12 @@ std::optional<SceneSight::Surface> SceneSight::first_surface(Vector3d const& ori
   Vector3f const along = direction.cast<float>();
   RayHit const hit = rays_.first_hit(local(origin), along);
   if (hit.triangle < 0) return std::nullopt;
-  bool const ignored = winding_ == Winding::ignored, front = normal(hit.triangle).dot(along) < 0;
+  bool const ignored = winding_ == SceneWinding::ignored, front = normal(hit.triangle).dot(along) < 0;
   return Surface{hit.distance, ignored || front, ignored || !front};
 }
 
 bool SceneSight::is_inside_object(Vector3d const& place) const {
-  if (winding_ == Winding::ignored) return false;
+  if (winding_ == SceneWinding::ignored) return false;
   int fronts = 0, backs = 0;
   for (int first = 0; first < kInsideDirections; first += kPacket) {
     RayDirections directions;
@@ -112,7 +112,7 @@ std::vector<SeenPoint> SceneSight::look_around(Vector3d const& eye, int directio
       if (hit.triangle < 0) continue;
       Vector3f facing = normal(hit.triangle);
       float cosine = -facing.dot(packet[k]);
-      if (winding_ == Winding::ignored && cosine < 0) {
+      if (winding_ == SceneWinding::ignored && cosine < 0) {
         facing = -facing;
         cosine = -cosine;
       }

@@ -11,7 +11,7 @@
 namespace scanview {
 
 /// Whether the triangles of a scene say which side of them is outside.
-enum class Winding {
+enum class SceneWinding {
   trusted,  ///< counter-clockwise seen from outside: a place that sees mostly backs is inside an object
   ignored,  ///< either side is a surface, and no place is inside of anything
 };
@@ -41,12 +41,12 @@ struct SeenPoint {
 class SceneSight {
  public:
   /// Throws Error{bad_input} for a model without triangles or without extent.
-  SceneSight(TriangleMesh const& scene, Winding winding);
+  SceneSight(TriangleMesh const& scene, SceneWinding winding);
   double radius() const { return model_.radius; }  ///< of a sphere that holds the scene
   Eigen::AlignedBox3d box() const;                 ///< of all triangles, scene coordinates
   /// To the nearest surface; `farthest` where that is farther.
   double distance(Eigen::Vector3d const& place, double farthest) const;
-  /// Whether more of 256 even directions meet backs than fronts first. Never with Winding::ignored.
+  /// Whether more of 256 even directions meet backs than fronts first. Never with SceneWinding::ignored.
   bool is_inside_object(Eigen::Vector3d const& place) const;
   /// What is seen along `directions` even ones (a Fibonacci spiral, turned at random by seed and item), each with the
   /// same solid angle.
@@ -57,7 +57,7 @@ class SceneSight {
   /// The first surface along a ray (direction: any length, scene units a step); nothing within the scene: no value.
   struct Surface {
     double distance;         ///< in lengths of `direction`
-    bool is_front, is_back;  ///< both with Winding::ignored
+    bool is_front, is_back;  ///< both with SceneWinding::ignored
   };
   std::optional<Surface> first_surface(Eigen::Vector3d const& origin, Eigen::Vector3d const& direction) const;
 
@@ -66,7 +66,7 @@ class SceneSight {
   Eigen::Vector3f normal(int triangle) const;
   CenteredModel model_;
   std::vector<Eigen::Vector3i> triangles_;
-  Winding winding_;
+  SceneWinding winding_;
   RayScene rays_;
 };
 

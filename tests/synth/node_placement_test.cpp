@@ -33,7 +33,7 @@ Placement place(TriangleMesh const& scene, WalkRegion const& region, PlacementOp
 /// rays from the eye and from the nodes.
 double worst_gap(TriangleMesh const& mesh, Placement const& placement, WalkRegion const& region) {
   RayScene const rays(mesh.vertices, mesh.triangles);
-  SceneSight const scene(mesh, Winding::trusted);
+  SceneSight const scene(mesh, SceneWinding::trusted);
   Context other;
   other.seed = 99;
   double worst = 0;
@@ -99,7 +99,7 @@ TEST(NodePlacement, NoEyeHasAGapAboveTheGreatestAndNodesAreWalkable) {
   // What 2000 directions say of a share of 0.002 scatters by 0.001; the eyes are others, too.
   EXPECT_LE(worst_gap(scene, placement, region), 0.002 + 3 * 0.001);
   EXPECT_LE(placement.uncovered_mean, 0.0005);
-  SceneSight const sight(scene, Winding::trusted);
+  SceneSight const sight(scene, SceneWinding::trusted);
   for (Vector3d const& node : placement.nodes) {
     EXPECT_TRUE(region.box.contains(node));
     EXPECT_GE(sight.distance(node, 1), 0.3);
@@ -176,7 +176,7 @@ TEST(NodePlacement, IgnoredWindingWalksInARoomThatIsWoundOutward) {
   add_block(room, {-3, 0, -3}, {3, 3, 3});
   EXPECT_SCANVIEW_ERROR(place(room, region_of_rooms(1)), ErrorCode::bad_input, "winding");
   PlacementOptions how = options();
-  how.winding = Winding::ignored;
+  how.winding = SceneWinding::ignored;
   EXPECT_EQ(place(room, region_of_rooms(1), how).nodes.size(), 1u);
 }
 

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 TEST(SceneSight, DistanceIsToTheNearestSurfaceAndCapped) {
   TriangleMesh mesh;
   add_block(mesh, {-1, -1, -1}, {1, 1, 1});
-  SceneSight const scene(mesh, Winding::trusted);
+  SceneSight const scene(mesh, SceneWinding::trusted);
   CounterRandom random(7, 0);
   for (int i = 0; i < 1000; ++i) {
     Vector3d const p(6 * random.uniform() - 3, 6 * random.uniform() - 3, 6 * random.uniform() - 3);
@@ -30,7 +30,7 @@ TEST(SceneSight, DistanceIsToTheNearestSurfaceAndCapped) {
 TEST(SceneSight, InsideIsWhereMostlyBacksAreSeen) {
   TriangleMesh mesh = make_rooms(1);
   add_column(mesh, 1, 1);
-  SceneSight const scene(mesh, Winding::trusted), either(mesh, Winding::ignored);
+  SceneSight const scene(mesh, SceneWinding::trusted), either(mesh, SceneWinding::ignored);
   EXPECT_FALSE(scene.is_inside_object({0, 1.5, 0}));
   EXPECT_FALSE(scene.is_inside_object({20, 1.5, 0}));
   EXPECT_TRUE(scene.is_inside_object({1, 1.5, 1}));
@@ -41,7 +41,7 @@ TEST(SceneSight, InsideIsWhereMostlyBacksAreSeen) {
 TEST(SceneSight, AWallIsSeenByTheRulesOnly) {
   TriangleMesh mesh;
   add_block(mesh, {-100, -100, -2}, {100, 100, 0});  // its front, z = 0, seen from z = 1
-  SceneSight const scene(mesh, Winding::trusted);
+  SceneSight const scene(mesh, SceneWinding::trusted);
   Vector3d const eye(0, 0, 1);
   auto const count = [&](Vector3d const& node, SightRules const& rules) {
     int bits = 0;
@@ -66,7 +66,7 @@ TEST(SceneSight, AWallIsSeenByTheRulesOnly) {
 
 TEST(SceneSight, WhatAWallHidesIsUncovered) {
   TriangleMesh const mesh = make_rooms(2);
-  SceneSight const scene(mesh, Winding::trusted);
+  SceneSight const scene(mesh, SceneWinding::trusted);
   Vector3d const left(0, 1.5, 0), right(6.2, 1.5, 0);
   SightRules const any{.least_cosine = 0, .greatest_coarseness = 1e6};
   EXPECT_EQ(uncovered_share(scene, {left}, left, 10000, any), 0);

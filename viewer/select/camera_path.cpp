@@ -68,6 +68,13 @@ Isometry3d between_poses(Isometry3d const& a, Isometry3d const& b, double t, Vec
   return pose;
 }
 
+Isometry3d between_straight(Isometry3d const& a, Isometry3d const& b, double t) {
+  Isometry3d pose = Isometry3d::Identity();
+  pose.linear() = Eigen::Quaterniond(a.linear()).slerp(t, Eigen::Quaterniond(b.linear())).toRotationMatrix();
+  pose.translation() = (1 - t) * a.translation() + t * b.translation();
+  return pose;
+}
+
 void check_size(int width, int height) {
   if (width < 1 || height < 1) throw Error(ErrorCode::usage, {}, "a picture needs at least one pixel");
 }
@@ -191,7 +198,7 @@ std::vector<PathCamera> halfway_path(ScanSet const& set, OrbitFrame const& frame
 }
 
 std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, ScanSet const& set, OrbitFrame const& frame,
-                                         int width, int height) {
+                                         int width, int height, PathMotion motion) {
   check_size(width, height);
   Json const json = read_json(file);
   auto const refuse = [&](std::string const& why) { throw Error(ErrorCode::bad_input, file, why); };
@@ -228,8 +235,10 @@ std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, Scan
     for (int step = 0; step < steps; ++step) {
       PathCamera camera = keys[i];
       if (step > 0) {
-        camera.object_from_camera = between_poses(keys[i].object_from_camera, keys[i + 1].object_from_camera,
-                                                  static_cast<double>(step) / steps, set.center, frame.up);
+        Eigen::Isometry3d const &from = keys[i].object_from_camera, &to = keys[i + 1].object_from_camera;
+        double const t = static_cast<double>(step) / steps;
+        camera.object_from_camera = motion == PathMotion::straight ? between_straight(from, to, t)
+                                                                   : between_poses(from, to, t, set.center, frame.up);
       }
       camera.name = fmt::format("{:03}", path.size());
       path.push_back(std::move(camera));

@@ -56,11 +56,14 @@ inline std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int h
   return halfway_path(set, orbit_frame(set), width, height);
 }
 
+/// How an eye gets from one keyframe to the next: on an arc about the set's centre, or straight on.
+enum class PathMotion { about_center, straight };
+
 /// A camera path file: {"format": 1, "keyframes": [{"camera": {...} (optional), "object_from_camera": [16]}, ...],
 /// "between": frames from one keyframe to the next, not counting its end (default 1: keyframes only)}. Throws
 /// Error{bad_input}.
 std::vector<PathCamera> read_camera_path(std::filesystem::path const& path, ScanSet const& set, OrbitFrame const& frame,
-                                         int width, int height);
+                                         int width, int height, PathMotion motion = PathMotion::about_center);
 inline std::vector<PathCamera> read_camera_path(std::filesystem::path const& path, ScanSet const& set, int width,
                                                 int height) {
   return read_camera_path(path, set, orbit_frame(set), width, height);
