@@ -13,9 +13,11 @@
 #include "base/error.h"
 #include "cli/stages.h"
 #include "viewer/visibility/visibility_file.h"
+#include "viewer/walkthrough/walkthrough_file.h"
 #include "viewer/window/commands.h"
 #include "viewer/window/model_window.h"
 #include "viewer/window/view_window.h"
+#include "viewer/window/walk_window.h"
 
 namespace scanview {
 namespace fs = std::filesystem;
@@ -81,20 +83,51 @@ void view_model_file(fs::path const& path, fs::path const& visibility, ModelWind
                            result.select_microseconds);
 }
 
+void view_walkthrough_folder(fs::path const& folder, WalkWindowOptions options, Session& session) {
+  options.title = "scanview " + folder.string();
+  WalkWindowResult const result = view_walkthrough(folder, options, session.context);
+  if (!result.failures.empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
+  if (!result.times) return;
+  report_times(*result.times, options.frames, session);
+  session.report["uncovered"] = result.uncovered;
+  session.report["triangles"] = result.triangles;
+  std::cout << fmt::format("uncovered {:.3f} %, {:.0f} triangles a frame\n", 100 * result.uncovered, result.triangles);
+}
+
+/// What `view` was given, which some options are for.
+enum class Viewed { set, model, walkthrough };
+
+Viewed kind_of(fs::path const& path) {
+  if (fs::is_regular_file(path)) return Viewed::model;
+  return is_walkthrough(path) ? Viewed::walkthrough : Viewed::set;
+}
+
+void refuse_given(std::vector<CLI::Option*> const& options, char const* why) {
+  for (CLI::Option const* const option : options)
+    if (option->count() > 0) throw Error(ErrorCode::usage, {}, option->get_name() + why);
+}
+
 }  // namespace
 
 void add_view(CLI::App& app, Session& session) {
   struct Arguments {
     fs::path path, visibility, cameras;
     WindowOptions options;
-    std::string back_end = "auto", up = "y";
+    std::string back_end = "auto", up = "y", policy = to_string(WalkthroughOptions().policy);
   };
   static std::map<std::string, UpAxis> const kAxes = {{"x", UpAxis::x},        {"y", UpAxis::y},
                                                       {"z", UpAxis::z},        {"-x", UpAxis::minus_x},
                                                       {"-y", UpAxis::minus_y}, {"-z", UpAxis::minus_z}};
+  static auto const kPolicies = [] {
+    std::map<std::string, MergePolicy> policies;
+    for (MergePolicy const policy : kMergePolicies) policies[to_string(policy)] = policy;
+    return policies;
+  }();
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("view", "A window to turn the object in");
-  verb->add_option("path", arguments->path, "The scan set, meshed; or a file with a polygon model")->required();
+  CLI::App* verb = app.add_subcommand("view", "A window to turn the object in, or to walk through a scene");
+  verb->add_option("path", arguments->path,
+                   "The scan set, meshed; or a file with a polygon model; or the folder of a walkthrough")
+      ->required();
   verb->add_option("--width", arguments->options.width, "Of the window, in pixels");
   verb->add_option("--height", arguments->options.height, "Of the window, in pixels");
   verb->add_option("--pictures", arguments->options.pictures, "Folder where P saves pictures and K a camera path");
@@ -110,22 +143,34 @@ void add_view(CLI::App& app, Session& session) {
       verb->add_option("--up", arguments->up, "The axis that is up: x, y, z, -x, -y or -z")
           ->check(CLI::IsMember(kAxes))};
   for (CLI::Option* const option : of_models) option->group(group);
-  verb->footer("A set:\n" + window_help() + "\n\nA model:\n" + model_window_help());
-  verb->callback([arguments, of_models, &session] {
+  std::vector<CLI::Option*> const of_walkthroughs = {
+      verb->add_option("--policy", arguments->policy,
+                       "How nodes are merged at first: layering, binary, weighted or positional")
+          ->check(CLI::IsMember(kPolicies))};
+  for (CLI::Option* const option : of_walkthroughs) option->group("Of a walkthrough");
+  verb->footer("A set:\n" + window_help() + "\n\nA model:\n" + model_window_help() + "\n\nA walkthrough:\n" +
+               walk_window_help());
+  verb->callback([arguments, of_models, of_walkthroughs, &session] {
     session.verb = "view";
-    session.work = [arguments, of_models, &session] {
+    session.work = [arguments, of_models, of_walkthroughs, &session] {
       WindowOptions& options = arguments->options;
-      if (!fs::is_regular_file(arguments->path)) {
-        for (CLI::Option const* const option : of_models) {
-          if (option->count() > 0)
-            throw Error(ErrorCode::usage, {}, option->get_name() + " is for a polygon model, not for a scan set");
-        }
+      Viewed const viewed = kind_of(arguments->path);
+      if (viewed != Viewed::model) refuse_given(of_models, " is for a polygon model");
+      if (viewed != Viewed::walkthrough) refuse_given(of_walkthroughs, " is for a walkthrough");
+      if (viewed == Viewed::set) {
         if (arguments->back_end != "auto") options.back_end = arguments->back_end == "cpu" ? BackEnd::cpu : BackEnd::gl;
         view_set(arguments->path, options, session);
         return;
       }
       if (arguments->back_end == "gl")
-        throw Error(ErrorCode::usage, {}, "--back-end: models are drawn by the processor");
+        throw Error(ErrorCode::usage, {}, "--back-end: models and walkthroughs are drawn by the processor");
+      if (viewed == Viewed::walkthrough) {
+        WalkWindowOptions of_walkthrough;
+        static_cast<BasicWindowOptions&>(of_walkthrough) = options;
+        of_walkthrough.rendering.policy = kPolicies.at(arguments->policy);
+        view_walkthrough_folder(arguments->path, of_walkthrough, session);
+        return;
+      }
       ModelWindowOptions of_model;
       static_cast<BasicWindowOptions&>(of_model) = options;
       of_model.up = kAxes.at(arguments->up);

@@ -76,6 +76,22 @@ class NodeCache final : public NodeLibrary {
     return lines;
   }
 
+  bool has_failed(std::size_t node) const override {
+    std::lock_guard const lock(mutex_);
+    return !usable_level(node, 0);
+  }
+
+  NodeTraffic traffic() const override {
+    std::lock_guard const lock(mutex_);
+    NodeTraffic traffic;
+    for (auto const& levels : slots_)
+      traffic.nodes += std::any_of(levels.begin(), levels.end(), [](Slot const& slot) { return slot.node != nullptr; });
+    traffic.bytes = bytes_;
+    traffic.waiting = asked_.size() + (is_reading_asked_ ? 1 : 0);
+    traffic.settled = settled_;
+    return traffic;
+  }
+
   void follow(Eigen::Vector3d const& eye) override {
     auto const now = Clock::now();
     Eigen::Vector3d expected = eye;
@@ -139,10 +155,14 @@ class NodeCache final : public NodeLibrary {
     while (true) {
       wake_.wait(lock, [&] { return ends_ || !asked_.empty() || !ahead_.empty(); });
       if (ends_) return;
-      std::deque<Wanted>& next = asked_.empty() ? ahead_ : asked_;
+      is_reading_asked_ = !asked_.empty();
+      std::deque<Wanted>& next = is_reading_asked_ ? asked_ : ahead_;
       auto const [node, level] = next.front();
       next.pop_front();
-      if (slots_[node][level].node || !failures_[node][level].empty()) continue;
+      if (slots_[node][level].node || !failures_[node][level].empty()) {
+        is_reading_asked_ = false;
+        continue;
+      }
       lock.unlock();
       std::shared_ptr<RasterNode const> read;
       std::string failure;
@@ -155,6 +175,8 @@ class NodeCache final : public NodeLibrary {
       lock.lock();
       failures_[node][level] = failure;
       slots_[node][level] = {read, clock_};
+      is_reading_asked_ = false;
+      ++settled_;
       if (read) {
         bytes_ += read->bytes();
         forget({node, level});
@@ -193,6 +215,8 @@ class NodeCache final : public NodeLibrary {
   std::deque<Wanted> asked_, ahead_;                ///< what a frame needs; what one will need
   std::size_t bytes_ = 0;
   std::uint64_t clock_ = 0;
+  std::size_t settled_ = 0;
+  bool is_reading_asked_ = false;  ///< what is being read is what a frame needs
   bool ends_ = false;
   std::thread reader_;
 };

@@ -31,6 +31,9 @@ struct WalkthroughOptions {
   /// Whether a sample's distance from the silhouettes of its node counts too: texels at a silhouette hold a mixture of
   /// what is on both its sides.
   enum class Silhouettes { fade, keep } silhouettes = Silhouettes::fade;
+  /// How a picture comes about, in false colour (view_hue() of a node's index). sources: in each pixel that of the node
+  /// that counts most there. triangles: over the picture, the edges of each node's triangles in its own.
+  enum class Show { picture, sources, triangles } show = Show::picture;
   /// δ: samples of one surface may differ by this share of their depth, and beyond that by so many pixels of parallax
   /// at the nodes' walking radius.
   double depth_tolerance = 0.01;

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "viewer/raster/tile_composition.h"
+#include "viewer/view_based/view_based_renderer.h"
 #include "viewer/walkthrough/gap_interpolation.h"
 
 namespace scanview {
@@ -44,6 +45,19 @@ Gaps find_gaps(cv::Mat4b const& color) {
   return {count, cv::Rect(left, top, right - left + 1, bottom - top + 1)};
 }
 
+SoftZ::Show shown_by(WalkthroughOptions const& options) {
+  return options.show == WalkthroughOptions::Show::sources ? SoftZ::Show::winner : SoftZ::Show::picture;
+}
+
+ComposedLayer composed_layer(RasterNode const& node, std::size_t index) {
+  ComposedLayer layer;
+  layer.texture = &node.texture();
+  layer.weight = 1;
+  Eigen::Vector3f const hue = view_hue(index);
+  std::copy_n(hue.data(), 3, layer.hue);
+  return layer;
+}
+
 void require(bool holds, char const* what) {
   if (!holds) throw Error(ErrorCode::usage, {}, std::string("walkthrough options: ") + what);
 }
@@ -67,6 +81,13 @@ class LibraryInMemory final : public NodeLibrary {
   double focal_length() const override { return focal_length_; }
   std::shared_ptr<RasterNode const> get(std::size_t node, double, Wait) override { return nodes_[node]; }
   std::vector<std::string> failures() const override { return {}; }
+  bool has_failed(std::size_t) const override { return false; }
+  NodeTraffic traffic() const override {
+    NodeTraffic traffic;
+    traffic.nodes = nodes_.size();
+    for (auto const& node : nodes_) traffic.bytes += node->bytes();
+    return traffic;
+  }
   void follow(Eigen::Vector3d const&) override {}
 
  private:
@@ -127,6 +148,7 @@ std::vector<UsedNode> WalkthroughRenderer::nodes_by_distance(Eigen::Vector3d con
 std::shared_ptr<RasterNode const> WalkthroughRenderer::get(UsedNode const& used) {
   auto node = library_->get(used.node, used.distance,
                             patience_ == Patience::waits ? NodeLibrary::Wait::yes : NodeLibrary::Wait::no);
+  complete_ = complete_ && (node || library_->has_failed(used.node));
   return node;
 }
 
@@ -134,6 +156,7 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
                                Eigen::Isometry3d const& scene_from_camera, cv::Mat4b color, cv::Mat1f depth) {
   SoftZ soft_z;
   soft_z.nearest = options_.policy == MergePolicy::layering;
+  soft_z.show = shown_by(options_);
   Composition how = composition(soft_z, camera);
   how.agree = false;  // each side projects its own picture
   how.squarings = options_.quality == NodeQuality::density ? 2 : 0;
@@ -145,10 +168,10 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     LayerRasterizer::Layer layer = nodes[i].node->layer(camera, scene_from_camera);
     if (layer.parts.empty()) continue;
+    layer.wireframe = options_.show == WalkthroughOptions::Show::triangles;
     layers.push_back(std::move(layer));
-    ComposedLayer compose;
-    compose.texture = &nodes[i].node->texture();
-    compose.weight = options_.policy == MergePolicy::positional ? float(nodes[i].weight) : 1.0F;
+    ComposedLayer compose = composed_layer(*nodes[i].node, nodes[i].index);
+    if (options_.policy == MergePolicy::positional) compose.weight = float(nodes[i].weight);
     compose.fill_rank = 1;
     compose.feather = options_.silhouettes == WalkthroughOptions::Silhouettes::fade;
     composed.push_back(compose);
@@ -168,15 +191,15 @@ bool WalkthroughRenderer::fill(Drawn const& node, UsedNode& used, Camera const& 
   Gaps const gaps = find_gaps(frame.color);
   if (gaps.count == 0) return false;
   Camera const narrowed = camera.cropped(gaps.area.x, gaps.area.y, gaps.area.width, gaps.area.height);
-  LayerRasterizer::Layer const layer = node.node->layer(narrowed, scene_from_camera);
+  LayerRasterizer::Layer layer = node.node->layer(narrowed, scene_from_camera);
   used.sides = layer.parts.size();
   for (LayerRasterizer::Part const& part : layer.parts) used.triangles += part.mesh->labels.size();
   if (layer.parts.empty()) return true;
-  ComposedLayer compose;
-  compose.texture = &node.node->texture();
-  compose.weight = 1;
+  layer.wireframe = options_.show == WalkthroughOptions::Show::triangles;
+  ComposedLayer const compose = composed_layer(*node.node, node.index);
   SoftZ soft_z;
   soft_z.nearest = true;
+  soft_z.show = shown_by(options_);
   Composition const how = composition(soft_z, camera);
   Frame patch = new_frame(narrowed.width(), narrowed.height());
   cv::Mat4b color = frame.color(gaps.area);
@@ -220,12 +243,9 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
   std::size_t next = 0;
   for (; next < all.size() && merged.size() < std::size_t(options_.merged); ++next) {
     auto node = get(all[next]);
-    if (!node) {
-      complete_ = false;
-      continue;
-    }
+    if (!node) continue;
     used_.push_back(all[next]);
-    merged.push_back({std::move(node), 0});
+    merged.push_back({std::move(node), used_.back().node, 0});
   }
   double const after = next < all.size() ? 1 / all[next].distance : 0;
   double const least = 1e-9 * library_->walking_radius();
@@ -256,11 +276,8 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
   for (std::size_t filled = 0; open && next < all.size() && filled < std::size_t(options_.filling); ++next) {
     UsedNode used = all[next];
     auto node = get(used);
-    if (!node) {
-      complete_ = false;
-      continue;
-    }
-    open = fill({std::move(node), 0}, used, camera, scene_from_camera, frame);
+    if (!node) continue;
+    open = fill({std::move(node), used.node, 0}, used, camera, scene_from_camera, frame);
     if (open) used_.push_back(used);
     ++filled;
   }

@@ -53,6 +53,7 @@ class WalkthroughRenderer final : public Renderer {
  private:
   struct Drawn {
     std::shared_ptr<RasterNode const> node;
+    std::size_t index;
     double weight;
   };
   std::vector<UsedNode> nodes_by_distance(Eigen::Vector3d const& eye) const;

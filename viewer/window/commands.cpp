@@ -89,6 +89,65 @@ std::optional<Command> model_command_of_key(int key) {
   }
 }
 
+std::optional<Command> walk_command_of_key(int key) {
+  switch (key) {
+    case GLFW_KEY_ESCAPE:
+      return Command::quit;
+    case GLFW_KEY_SPACE:
+      return Command::turntable;
+    case GLFW_KEY_HOME:
+      return Command::reset;
+    case GLFW_KEY_K:
+      return Command::add_keyframe;
+    case GLFW_KEY_M:
+      return Command::next_policy;
+    case GLFW_KEY_G:
+      return Command::next_gaps;
+    case GLFW_KEY_F:
+      return Command::toggle_filling;
+    case GLFW_KEY_V:
+      return Command::toggle_sources;
+    case GLFW_KEY_T:
+      return Command::toggle_triangles;
+    case GLFW_KEY_L:
+      return Command::toggle_free;
+    case GLFW_KEY_N:
+      return Command::next_node;
+    case GLFW_KEY_B:
+      return Command::previous_node;
+    default:
+      return common_command_of_key(key);
+  }
+}
+
+std::optional<WalkStep> walk_step_of_key(int key) {
+  constexpr double kTurnDeg = 75;
+  switch (key) {
+    case GLFW_KEY_W:
+    case GLFW_KEY_UP:
+      return WalkStep{1, 0, 0, 0};
+    case GLFW_KEY_S:
+    case GLFW_KEY_DOWN:
+      return WalkStep{-1, 0, 0, 0};
+    case GLFW_KEY_D:
+      return WalkStep{0, 1, 0, 0};
+    case GLFW_KEY_A:
+      return WalkStep{0, -1, 0, 0};
+    case GLFW_KEY_E:
+    case GLFW_KEY_PAGE_UP:
+      return WalkStep{0, 0, 1, 0};
+    case GLFW_KEY_Q:
+    case GLFW_KEY_PAGE_DOWN:
+      return WalkStep{0, 0, -1, 0};
+    case GLFW_KEY_RIGHT:
+      return WalkStep{0, 0, 0, kTurnDeg};
+    case GLFW_KEY_LEFT:
+      return WalkStep{0, 0, 0, -kTurnDeg};
+    default:
+      return std::nullopt;
+  }
+}
+
 std::optional<std::size_t> view_of_key(int key) {
   if (key < GLFW_KEY_1 || key > GLFW_KEY_9) return std::nullopt;
   return static_cast<std::size_t>(key - GLFW_KEY_1);
@@ -129,6 +188,31 @@ std::string model_window_help() {
          "N: silhouettes and creases on white paper\n"
          "U: another of the model's axes is up\n"
          "C: add a camera for visibility build --cameras\n"
+         "Tab: panel on and off\n"
+         "H: this help\n"
+         "Esc: quit";
+}
+
+std::string walk_window_help() {
+  return "W, S or up, down: walk forwards, backwards\n"
+         "A, D: sideways\n"
+         "left, right: turn\n"
+         "E, Q or page up, page down: raise, lower the eye\n"
+         "shift: three times as fast\n"
+         "left drag: look around\n"
+         "right, middle or shift drag: sideways, up and down\n"
+         "wheel: forwards, backwards\n"
+         "1-9, N, B: to a node, the next, the one before; or click it in the map\n"
+         "R or Home: back to the first node\n"
+         "space: look around, on and on\n"
+         "M: the next way to merge nodes (in a set's window M measures, N marks points)\n"
+         "F: fill gaps from further nodes, or not\n"
+         "G: gaps as background, interpolated, or magenta\n"
+         "V: which node each pixel comes from\n"
+         "T: the triangles\n"
+         "L: leave the box that was made to be walked in\n"
+         "P: save a picture\n"
+         "K: add a keyframe for walkthrough render --path\n"
          "Tab: panel on and off\n"
          "H: this help\n"
          "Esc: quit";

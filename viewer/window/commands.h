@@ -2,6 +2,8 @@
 #include <optional>
 #include <string>
 
+#include "viewer/window/walk_control.h"
+
 namespace scanview {
 
 /// What clicks and drags are for.
@@ -43,6 +45,15 @@ enum class Command {
   toggle_lines,
   add_camera,
   next_up,
+  // Of a walkthrough's window:
+  next_policy,
+  next_gaps,
+  toggle_filling,
+  toggle_sources,
+  toggle_triangles,
+  toggle_free,
+  previous_node,
+  next_node,
 };
 
 /// The command of a key (GLFW's number); nothing where it has none in this mode. M, N and O lead into their modes and,
@@ -52,11 +63,19 @@ std::optional<Command> command_of_key(int key, WindowMode mode);
 /// The same in the window of a model, which has no modes.
 std::optional<Command> model_command_of_key(int key);
 
+/// The same in the window of a walkthrough, for keys that do something once.
+std::optional<Command> walk_command_of_key(int key);
+
+/// What a key does for as long as it is held in the window of a walkthrough: a step of length 1, or the degrees of a
+/// quick look around, in a second.
+std::optional<WalkStep> walk_step_of_key(int key);
+
 /// 0 to 8 for the keys 1 to 9.
 std::optional<std::size_t> view_of_key(int key);
 
 /// The mouse and the keys, one a line.
 std::string window_help();
 std::string model_window_help();
+std::string walk_window_help();
 
 }  // namespace scanview

@@ -30,18 +30,22 @@ struct GlfwWindow::State {
   static State& of(GLFWwindow* window) { return *static_cast<State*>(glfwGetWindowUserPointer(window)); }
 
   WindowEvent& add(WindowEvent::Kind kind) {
-    auto const held = [&](int key) { return glfwGetKey(window, key) == GLFW_PRESS; };
     WindowEvent event;
     event.kind = kind;
     event.x = x;
     event.y = y;
-    event.shift = held(GLFW_KEY_LEFT_SHIFT) || held(GLFW_KEY_RIGHT_SHIFT);
+    event.shift = holds_shift();
     // What is there as soon as polling begins may have waited since the last time.
     constexpr double kAtOnce = 0.002;
     double const now = glfwGetTime();
     event.seconds = now - poll_began < kAtOnce ? poll_ended : now;
     events.push_back(event);
     return events.back();
+  }
+
+  bool holds_shift() const {
+    return glfwGetKey(window, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
+           glfwGetKey(window, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
   }
 
   void point_at(double screen_x, double screen_y) {
@@ -89,7 +93,7 @@ GlfwWindow::GlfwWindow(int width, int height, std::string const& title) : state_
   glfwSetScrollCallback(window,
                         [](GLFWwindow* w, double, double steps) { State::of(w).add(Kind::scroll).steps = steps; });
   glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
-    if (action != GLFW_RELEASE) State::of(w).add(Kind::key).key = key;
+    State::of(w).add(action == GLFW_RELEASE ? Kind::key_release : Kind::key).key = key;
   });
   glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { State::of(w).add(Kind::exposed); });
   glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { State::of(w).add(Kind::exposed); });
@@ -131,6 +135,10 @@ std::vector<WindowEvent> GlfwWindow::poll(double seconds) {
   state_->poll_ended = glfwGetTime();
   return std::exchange(state_->events, {});
 }
+
+double GlfwWindow::seconds() const { return glfwGetTime(); }
+
+bool GlfwWindow::holds_shift() const { return state_->holds_shift(); }
 
 bool GlfwWindow::should_close() const { return glfwWindowShouldClose(state_->window) == GLFW_TRUE; }
 

@@ -26,6 +26,8 @@ class GlfwWindow final : public GlContext {
   /// All that has happened since the last call, in its order: also what began and ended between two calls. Waits up to
   /// `seconds` for something to happen (0: does not wait).
   std::vector<WindowEvent> poll(double seconds);
+  double seconds() const;  ///< now, on the clock of WindowEvent::seconds
+  bool holds_shift() const;
   bool should_close() const;
   void close();
   void size_in_pixels(int& width, int& height) const;

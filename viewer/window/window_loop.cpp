@@ -47,6 +47,7 @@ void WindowLoop::run() {
       moved();
     }
     last = Clock::now();
+    if (keys_.any()) hold(keys_.take(window_.seconds()));
     look_around();
     draw_what_is_stale();
   }
@@ -94,7 +95,9 @@ void WindowLoop::moved() {
 
 double WindowLoop::seconds_since_start() const { return seconds_since(started_); }
 
-double WindowLoop::idle_seconds() const { return status().turning || stale_ || panel_frames_ > 0 ? 0 : patience(); }
+double WindowLoop::idle_seconds() const {
+  return status().turning || stale_ || panel_frames_ > 0 || keys_.any() ? 0 : patience();
+}
 
 void WindowLoop::handle(WindowEvent const& event) {
   using Kind = WindowEvent::Kind;
@@ -106,12 +109,19 @@ void WindowLoop::handle(WindowEvent const& event) {
     panel_frames_ = std::max(panel_frames_, 1);
     return;
   }
+  if (event.kind == Kind::key_release) {
+    keys_.feed(event);
+    return;
+  }
+  if (event.kind == Kind::key && keys_.is_held(event.key)) return;  // the keyboard repeats
   // The panel lights up what the pointer is over; elsewhere a move alone changes nothing.
   if (event.kind != Kind::move || !inside || was_beside_) panel_frames_ = kSettle;
   was_beside_ = !inside;
   if (event.kind == Kind::key || event.kind == Kind::press) status().message.clear();
   if (event.kind == Kind::key) {
-    if (!frame_.takes_keys()) press(event.key);
+    if (frame_.takes_keys()) return;
+    if (holds(event.key)) keys_.feed(event);
+    press(event.key);
     return;
   }
   if (!inside && !pointer_.held()) return;

@@ -1,5 +1,6 @@
 #pragma once
 #include <chrono>
+#include <map>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include "viewer/window/commands.h"
 #include "viewer/window/frame_presenter.h"
 #include "viewer/window/glfw_window.h"
+#include "viewer/window/held_keys.h"
 #include "viewer/window/orbit_control.h"
 #include "viewer/window/panel_frame.h"
 #include "viewer/window/pointer_gestures.h"
@@ -46,6 +48,10 @@ class WindowLoop {
   /// Around the picture, and what its buttons ask for.
   virtual void draw_panel() = 0;
   virtual void press(int key) = 0;
+  /// Keys that do something for as long as they are held; press() is called for them once, without repeats.
+  virtual bool holds(int) const { return false; }
+  /// Before each frame while such keys are held: for how many seconds each was since the last time.
+  virtual void hold(std::map<int, double> const&) {}
   virtual void point(Gesture const& gesture) = 0;
   virtual void turn(double degrees) = 0;          ///< the turntable
   virtual bool is_flat() const { return false; }  ///< what is shown does not turn, and is never drawn coarsely
@@ -94,6 +100,7 @@ class WindowLoop {
 
   FramePresenter presenter_;
   PointerGestures pointer_;
+  HeldKeys keys_;
   Clock::time_point const started_ = Clock::now();
   Clock::time_point moved_;
   int width_ = 0, height_ = 0;

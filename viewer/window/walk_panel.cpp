@@ -1,0 +1,205 @@
+#include "viewer/window/walk_panel.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/srgb.h"
+#include "viewer/view_based/view_based_renderer.h"
+
+namespace scanview {
+namespace {
+
+/// A node's false colour as pictures show it.
+ImU32 hue_of(std::size_t node, float alpha = 1) {
+  auto const shown = [hue = view_hue(node)](int c) { return static_cast<float>(srgb_from_linear(hue[c])); };
+  return ImGui::GetColorU32(ImVec4(shown(0), shown(1), shown(2), alpha));
+}
+
+std::string length_of(double length, Unit unit) {
+  if (unit == Unit::arbitrary) return fmt::format("{:.3g}", length);
+  return fmt::format("{:.3g} {}", length, to_string(unit));
+}
+
+/// The drawing's place on the screen.
+struct MapCanvas {
+  ImVec2 corner;
+  float width, scale;
+  ImVec2 place(Eigen::Vector2d const& p) const {
+    return {corner.x + width * static_cast<float>(p.x()), corner.y + width * static_cast<float>(p.y())};
+  }
+};
+
+void draw_dot(ImDrawList& list, MapCanvas const& canvas, NodeMap::Dot const& dot) {
+  ImVec2 const at = canvas.place(dot.at);
+  if (dot.failed) {
+    float const arm = 4 * canvas.scale;
+    ImU32 const red = IM_COL32(255, 110, 90, 255);
+    list.AddLine(ImVec2(at.x - arm, at.y - arm), ImVec2(at.x + arm, at.y + arm), red, 2);
+    list.AddLine(ImVec2(at.x - arm, at.y + arm), ImVec2(at.x + arm, at.y - arm), red, 2);
+    return;
+  }
+  auto const weight = static_cast<float>(dot.weight);
+  float const size = canvas.scale * (dot.drawn ? 3.5F + 2.5F * weight : 2.5F);
+  // Those that fill are drawn, but fainter than those that are merged.
+  float const alpha = dot.weight > 0 ? 0.6F + 0.4F * std::sqrt(weight) : 0.45F;
+  list.AddCircleFilled(at, size, dot.drawn ? hue_of(dot.node, alpha) : IM_COL32(153, 158, 168, 200));
+  if (dot.weight > 0) list.AddCircle(at, size + 1, IM_COL32(255, 255, 255, 255));
+}
+
+void draw_view(ImDrawList& list, MapCanvas const& canvas, NodeMap const& map) {
+  ImVec2 const eye = canvas.place(map.eye), left = canvas.place(map.view[0]), right = canvas.place(map.view[1]);
+  list.AddTriangleFilled(eye, left, right, IM_COL32(255, 220, 90, 60));
+  list.AddLine(eye, left, IM_COL32(255, 220, 90, 220));
+  list.AddLine(eye, right, IM_COL32(255, 220, 90, 220));
+}
+
+void draw_bar(ImDrawList& list, MapCanvas const& canvas, NodeMap const& map, Unit unit) {
+  float const below = canvas.width * static_cast<float>(NodeMap::kHeight);
+  ImVec2 const from(canvas.corner.x + 8 * canvas.scale, canvas.corner.y + below - 6 * canvas.scale);
+  ImVec2 const to(from.x + canvas.width * static_cast<float>(map.bar_width), from.y);
+  ImU32 const light = IM_COL32(200, 205, 215, 255);
+  list.AddLine(from, to, light, 2);
+  std::string const text = length_of(map.bar, unit);
+  list.AddText(ImVec2(from.x, from.y - ImGui::GetTextLineHeight() - 1), light, text.c_str());
+}
+
+void draw_map(WalkPanelContent const& content, float scale, WalkPanelAnswer& answer) {
+  NodeMap const& map = content.map;
+  MapCanvas const canvas{ImGui::GetCursorScreenPos(), std::max(1.0F, ImGui::GetContentRegionAvail().x), scale};
+  ImVec2 const size(canvas.width, canvas.width * static_cast<float>(NodeMap::kHeight));
+  ImGui::InvisibleButton("map", size);
+  ImVec2 const end(canvas.corner.x + size.x, canvas.corner.y + size.y);
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  list.PushClipRect(canvas.corner, end, true);
+  list.AddRectFilled(canvas.corner, end, IM_COL32(30, 34, 40, 255), 3);
+  for (auto const& edge : map.edges)
+    list.AddLine(canvas.place(edge[0]), canvas.place(edge[1]), IM_COL32(90, 95, 105, 255));
+  draw_view(list, canvas, map);
+  for (auto const& dot : map.dots) draw_dot(list, canvas, dot);
+  list.AddCircleFilled(canvas.place(map.eye), 3 * scale, IM_COL32(255, 220, 90, 255));
+  draw_bar(list, canvas, map, content.unit);
+  list.PopClipRect();
+  if (!ImGui::IsItemHovered()) return;
+  ImVec2 const mouse = ImGui::GetIO().MousePos;
+  constexpr double kReach = 0.05;
+  std::size_t const node =
+      map.nearest({(mouse.x - canvas.corner.x) / canvas.width, (mouse.y - canvas.corner.y) / canvas.width}, kReach);
+  if (node >= content.names.size()) return;
+  ImGui::SetTooltip("node %s: click to go there", content.names[node].c_str());
+  if (ImGui::IsItemClicked()) answer.jump = node;
+}
+
+template <typename Choice>
+void radio(std::string const& label, Choice& current, Choice value) {
+  if (ImGui::RadioButton(label.c_str(), current == value)) current = value;
+}
+
+void draw_choices(WalkPanelContent& content, WalkPanelAnswer& answer) {
+  WalkLook& look = content.look;
+  float const second = 0.5F * ImGui::GetContentRegionAvail().x;
+  ImGui::TextUnformatted("merging (M)");
+  for (MergePolicy const policy : kMergePolicies) {
+    radio(to_string(policy), look.policy, policy);
+    if (policy == MergePolicy::layering || policy == MergePolicy::weighted) ImGui::SameLine(second);
+  }
+  ImGui::PushItemWidth(0.4F * ImGui::GetContentRegionAvail().x);
+  ImGui::SliderInt("nodes merged", &look.merged, 1, 16, "%d", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::Checkbox("fill gaps (F)", &look.fills);
+  if (look.fills) ImGui::SliderInt("nodes that fill", &look.filling, 1, 64, "%d", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::PopItemWidth();
+  ImGui::TextUnformatted("gaps that remain (G)");
+  radio("dark", look.gaps, GapLook::background);
+  ImGui::SameLine();
+  radio("smooth", look.gaps, GapLook::interpolated);
+  ImGui::SameLine();
+  radio("magenta", look.gaps, GapLook::magenta);
+  ImGui::Checkbox("fade at silhouettes", &look.fades);
+  using Show = WalkthroughOptions::Show;
+  radio("picture", look.show, Show::picture);
+  ImGui::SameLine();
+  radio("nodes (V)", look.show, Show::sources);
+  ImGui::SameLine();
+  radio("mesh (T)", look.show, Show::triangles);
+  bool free = content.is_free;
+  if (content.has_box && ImGui::Checkbox("also outside the box (L)", &free))
+    answer.commands.push_back(Command::toggle_free);
+}
+
+void draw_buttons(WalkPanelContent& content, WalkPanelAnswer& answer) {
+  auto const button = [&](char const* label, Command command) {
+    if (ImGui::SmallButton(label)) answer.commands.push_back(command);
+  };
+  button("< node (B)", Command::previous_node);
+  ImGui::SameLine();
+  button("node > (N)", Command::next_node);
+  ImGui::SameLine();
+  button("first (R)", Command::reset);
+  button(content.turning ? "stop (space)" : "look around (space)", Command::turntable);
+  ImGui::SameLine();
+  button("help (H)", Command::help);
+  button("picture (P)", Command::save_picture);
+  ImGui::SameLine();
+  button("keyframe (K)", Command::add_keyframe);
+  ImGui::SameLine();
+  ImGui::Text("%zu", content.keyframes);
+  if (content.keyframes == 0) return;
+  button("remove", Command::remove_keyframe);
+  ImGui::SameLine();
+  ImGui::PushItemWidth(0.35F * ImGui::GetContentRegionAvail().x);
+  ImGui::SliderInt("frames between", &content.frames_between, 1, 240, "%d", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::PopItemWidth();
+  ImGui::TextWrapped("%s", content.keyframe_command.c_str());
+}
+
+void draw_used(WalkPanelContent const& content, float scale) {
+  for (UsedNode const& used : content.used) {
+    float const side = ImGui::GetTextLineHeight();
+    ImVec2 const corner = ImGui::GetCursorScreenPos();
+    ImGui::GetWindowDrawList()->AddCircleFilled(ImVec2(corner.x + 0.5F * side, corner.y + 0.5F * side), 4 * scale,
+                                                hue_of(used.node));
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 1.4F * side);
+    ImGui::TextUnformatted(used_node_text(content, used).c_str());
+  }
+}
+
+}  // namespace
+
+std::string used_node_text(WalkPanelContent const& content, UsedNode const& used) {
+  std::string const share = used.weight > 0 ? fmt::format("{:3.0f} %", 100 * used.weight) : "fills";
+  return fmt::format("{} {} {:>8} {:6} tri.", content.names.at(used.node), share,
+                     length_of(used.distance, content.unit), used.triangles);
+}
+
+std::vector<std::string> walk_frame_text(WalkPanelContent const& content) {
+  std::vector<std::string> lines = {fmt::format("uncovered {:.3g} %", 100 * content.uncovered)};
+  for (auto const& [name, milliseconds] : content.stages)
+    lines.push_back(fmt::format("{} {:.1f} ms", name, milliseconds));
+  constexpr double kMegabyte = 1 << 20;
+  lines.push_back(fmt::format("in memory {} of {} nodes, {:.0f} MB", content.traffic.nodes, content.names.size(),
+                              static_cast<double>(content.traffic.bytes) / kMegabyte));
+  return lines;
+}
+
+WalkPanelAnswer draw_walk_panel(PanelFrame& frame, WalkPanelContent& content, Overlay const& overlay,
+                                Viewport const& viewport) {
+  WalkPanelAnswer answer;
+  frame.draw(content, overlay, viewport, [&] {
+    draw_map(content, frame.scale(), answer);
+    draw_choices(content, answer);
+    ImGui::Separator();
+    draw_buttons(content, answer);
+    ImGui::Separator();
+    draw_used(content, frame.scale());
+    for (auto const& line : walk_frame_text(content)) ImGui::TextUnformatted(line.c_str());
+    if (content.failures.empty()) return;
+    ImGui::Separator();
+    ImGui::TextColored(ImVec4(1, 0.5F, 0.4F, 1), "nodes that cannot be read: %zu", content.failures.size());
+    for (auto const& line : content.failures) ImGui::TextWrapped("%s", line.c_str());
+  });
+  return answer;
+}
+
+}  // namespace scanview
