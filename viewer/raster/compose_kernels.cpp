@@ -59,7 +59,11 @@ void MeasureQuality(ComposedLayer const& layer, Composition const& how, TileArea
     for (std::size_t x = 0; x < static_cast<std::size_t>(columns); x += lanes) {
       std::size_t const at = static_cast<std::size_t>(y * kTileStride) + x;
       auto const key = hn::LoadU(d, layer.samples.key + at);
-      auto const drawn = hn::And(hn::Gt(key, hn::Set(d, -FLT_MAX)), hn::Lt(key, hn::Set(d, FLT_MAX)));
+      auto drawn = hn::And(hn::Gt(key, hn::Set(d, -FLT_MAX)), hn::Lt(key, hn::Set(d, FLT_MAX)));
+      if (layer.backs_hide) {
+        auto const cosine = hn::ShiftRight<16>(hn::LoadU(du, layer.samples.packed + at));
+        drawn = hn::AndNot(hn::RebindMask(d, hn::Eq(cosine, hn::Zero(du))), drawn);
+      }
       if (hn::AllFalse(d, drawn)) {
         hn::StoreU(hn::Zero(d), d, layer.quality + at);
         hn::StoreU(hn::Zero(d), d, layer.fairness + at);

@@ -40,6 +40,7 @@ struct ComposedLayer {
   float weight = 0, fill = 0;
   float fill_rank = 0;                 ///< `fill` where it is decided what hides what
   bool cosine = true, feather = true;  ///< whether they count in the weight
+  bool backs_hide = false;             ///< a sample without cosine is none (Culling::backs_hide)
   /// Texel (s w, t w, w) of the point that pixel (x, y) of the picture shows at depth z:
   /// z · along (x, y, 1) + at (x, y, 1).
   float along[3][3] = {}, at[3][3] = {};

@@ -63,16 +63,18 @@ void LayerRasterizer::draw(std::vector<Layer> const& layers, int width, int heig
   if (width < 1 || height < 1 || width > kBlock || height > kBlock)
     throw std::logic_error("LayerRasterizer: a picture of no or too many pixels");
   std::vector<Part const*> parts;
+  std::vector<Culling> culling;
   std::vector<std::size_t> first_bins = {0};
   for (Layer const& layer : layers) {
     for (Part const& part : layer.parts) parts.push_back(&part);
+    culling.resize(parts.size(), layer.culling);
     first_bins.push_back(parts.size());
   }
   if (bins_.size() < parts.size()) bins_.resize(parts.size());
   threads_->arena.execute([&] {
     auto const start = Clock::now();
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      bins_[i].begin(*parts[i]->mesh, parts[i]->transform, width, height, Culling::back_faces);
+      bins_[i].begin(*parts[i]->mesh, parts[i]->transform, width, height, culling[i]);
     }
     for_each_part(
         parts.size(), [&](std::size_t i) { return bins_[i].vertex_parts(); },

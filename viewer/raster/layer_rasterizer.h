@@ -25,6 +25,7 @@ class LayerRasterizer {
     std::vector<Part> parts;  ///< whose transforms agree on perspective and light; at least one
     float largest_lod = 0;
     bool wireframe = false;
+    Culling culling = Culling::back_faces;
   };
 
   /// The buffers of one tile. Rows are kTileStride apart; vectors may be read past the last column.

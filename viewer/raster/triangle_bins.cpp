@@ -142,6 +142,7 @@ void TriangleBins::clip(Part& part, std::size_t triangle) const {
     std::int64_t const area2 = std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
     if (area2 == 0 || (area2 > 0 && culling_ == Culling::back_faces)) continue;
     if (area2 < 0) std::swap(b, c);
+    if (area2 > 0 && culling_ == Culling::backs_hide) clipped.label = 0;
     part.clipped.push_back(clipped);
     add(part, a, b, c, entry);
   }
@@ -191,7 +192,8 @@ void TriangleBins::collect(std::size_t tile, std::vector<ScreenTriangle>& out) c
       ScreenVertex const* c = &vertices_[static_cast<std::size_t>(corner[2])];
       std::int64_t const area2 = std::int64_t{b->x - a->x} * (c->y - a->y) - std::int64_t{b->y - a->y} * (c->x - a->x);
       if (area2 < 0) std::swap(b, c);
-      out.push_back({{a, b, c}, mesh_->labels[entry]});
+      bool const is_hidden = area2 > 0 && culling_ == Culling::backs_hide;
+      out.push_back({{a, b, c}, is_hidden ? 0 : mesh_->labels[entry]});
     }
   }
 }

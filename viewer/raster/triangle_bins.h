@@ -17,7 +17,9 @@ struct RasterMesh {
 /// `labels`: one a triangle.
 RasterMesh raster_mesh(TriangleMesh const& mesh, std::vector<std::uint32_t> labels);
 
-enum class Culling { back_faces, none };
+/// Of triangles that turn their back: left out; drawn as the others; or drawn under the label 0, so that they hide what
+/// is behind them.
+enum class Culling { back_faces, none, backs_hide };
 
 /// The triangles of one mesh, as seen by one camera, sorted by the tiles of the picture that they touch; in the order
 /// of the mesh within each tile, whatever the number of threads. Triangles that cover no pixel centre are left out,

@@ -62,11 +62,12 @@ bool is_behind(Eigen::AlignedBox3d const& box, Plane const& plane) {
 }
 
 std::vector<float> vertex_quality(NodeMesh const& node, NodeQuality quality, double walking_radius) {
+  constexpr float kLeast = 4.0F / 65535;  // in 16 bits still more than nothing
   std::vector<float> result = node.smooth_quality();
-  if (quality != NodeQuality::density) return result;
   for (std::size_t v = 0; v < result.size(); ++v) {
     double const times = node.vertices[v].cast<double>().norm() / walking_radius;
-    if (times > 1) result[v] /= float(times * times);
+    if (quality == NodeQuality::density && times > 1) result[v] /= float(times * times);
+    result[v] = std::max(result[v], kLeast);
   }
   return result;
 }
@@ -103,7 +104,8 @@ RasterNode::RasterNode(NodeMesh const& node, NodeQuality quality, double walking
       }
       mesh.triangles.push_back(triangle);
       constexpr float kOne = 65535;
-      labels.push_back(smooth.empty() ? std::uint32_t(std::lround(kOne * node.quality[t])) : std::uint32_t(kOne));
+      labels.push_back(smooth.empty() ? std::uint32_t(std::max(1L, std::lround(kOne * node.quality[t])))
+                                      : std::uint32_t(kOne));
     }
     side.mesh = raster_mesh(mesh, std::move(labels));
     if (!smooth.empty()) {
@@ -160,6 +162,7 @@ LayerRasterizer::Layer RasterNode::layer(Camera const& camera, Eigen::Isometry3d
   Eigen::Isometry3d const camera_from_node = node_from_camera.inverse();
   LayerRasterizer::Layer layer;
   layer.largest_lod = float(texture_.levels.size() - 1);
+  layer.culling = Culling::backs_hide;
   for (Side const& side : sides_) {
     if (!may_show(side, camera, node_from_camera)) continue;
     LayerRasterizer::Part part;

@@ -27,7 +27,8 @@ class RasterNode {
 
   /// The sides that may show something in the picture, for drawing them as one layer; no parts: none of them. Sides are
   /// left out whole (§5): those whose pyramid or whose triangles' box lies outside a side of the camera's frustum, or
-  /// the frustum outside a side of the pyramid.
+  /// the frustum outside a side of the pyramid. Backs hide what is behind them: seen from there, a wall is not
+  /// transparent.
   LayerRasterizer::Layer layer(Camera const& camera, Eigen::Isometry3d const& scene_from_camera) const;
 
  private:

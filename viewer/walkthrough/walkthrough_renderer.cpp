@@ -172,7 +172,7 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
     layers.push_back(std::move(layer));
     ComposedLayer compose = composed_layer(*nodes[i].node, nodes[i].index);
     if (options_.policy == MergePolicy::positional) compose.weight = float(nodes[i].weight);
-    compose.fill_rank = 1;
+    compose.backs_hide = true;
     compose.feather = options_.silhouettes == WalkthroughOptions::Silhouettes::fade;
     composed.push_back(compose);
   }
