@@ -53,6 +53,7 @@ ComposedLayer composed_layer(RasterNode const& node, std::size_t index) {
   ComposedLayer layer;
   layer.texture = &node.texture();
   layer.weight = 1;
+  layer.backs_hide = true;
   Eigen::Vector3f const hue = view_hue(index);
   std::copy_n(hue.data(), 3, layer.hue);
   return layer;
@@ -172,7 +173,6 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
     layers.push_back(std::move(layer));
     ComposedLayer compose = composed_layer(*nodes[i].node, nodes[i].index);
     if (options_.policy == MergePolicy::positional) compose.weight = float(nodes[i].weight);
-    compose.backs_hide = true;
     compose.feather = options_.silhouettes == WalkthroughOptions::Silhouettes::fade;
     composed.push_back(compose);
   }
