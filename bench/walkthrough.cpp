@@ -308,9 +308,9 @@ void coverage(std::vector<std::string> const& hand, std::vector<ReportSection>&,
     }
     fmt::print(
         "  {}: {} nodes, covered {:.3f} % of 1000 frames' pixels, worst frame {:.2f} %, {:.2f} ms a frame; "
-        "depth off by more than 5 % at {:.2f} % of pixels\n",
+        "depth off by more than 5 % at {:.2f} % of pixels; {:.0f} % of the gaps are sky\n",
         name, nodes.size(), 100 * (1 - uncovered), 100 * (1 - worst), median(times),
-        100 * double(off) / double(compared_pixels));
+        100 * double(off) / double(compared_pixels), 100 * double(sky_gaps) / double(std::max<std::size_t>(gaps, 1)));
   }
 }
 
