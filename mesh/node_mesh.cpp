@@ -113,6 +113,8 @@ class NodeMesher {
   }
 
   static void link_everything(SurfaceLinks& links) {
+    links.right = links.right.clone();  // shared with the steps
+    links.down = links.down.clone();
     for (int y = 0; y < links.object.rows; ++y)
       for (int x = 0; x < links.object.cols; ++x) {
         links.right(y, x) = links.is_object(x, y) && links.is_object(x + 1, y);
