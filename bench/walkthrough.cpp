@@ -257,10 +257,11 @@ std::vector<PathCamera> random_walk(std::vector<Vector3d> const& eyes, std::size
 }
 
 /// Covered pixels on random walks, with automatic nodes and with a person's.
-void coverage(std::vector<std::string> const& hand, std::vector<ReportSection>&, Context& context) {
+void coverage(std::vector<std::string> const& hand, double greatest_gap, Context& context) {
   TriangleMesh const model = make_gallery(100'000);
   WalkRegion const region{gallery_walk_box()};
-  PlacementOptions const placement;
+  PlacementOptions placement;
+  placement.greatest_gap = greatest_gap;
   double const start = seconds();
   Placement const placed = place_nodes(model, region, placement, context);
   fmt::print("automatic placement: {} nodes, {:.4f} % uncovered by rays, worst eye {:.3f} %, {:.1f} s\n",
@@ -325,6 +326,8 @@ int main(int argc, char** argv) {
   app.add_option("--frames", frames, "Between two nodes");
   app.add_option("--plot", plot, "A page with the plots");
   app.add_option("--hand", hand, "Files with positions that a person chose, for coverage");
+  double gap = PlacementOptions().greatest_gap;
+  app.add_option("--gap", gap, "PlacementOptions::greatest_gap, for coverage");
   app.add_option("--polygons", polygons, "Of the gallery, for the part polygons");
   app.add_option("--parts", parts, "experiment, nodes, polygons, coverage");
   CLI11_PARSE(app, argc, argv);
@@ -338,7 +341,7 @@ int main(int argc, char** argv) {
       if (wants("nodes")) over_nodes(camera, sections, context);
     }
     if (wants("polygons")) over_polygons(polygons, context);
-    if (wants("coverage")) coverage(hand, sections, context);
+    if (wants("coverage")) coverage(hand, gap, context);
     if (!plot.empty()) write_file(plot, html_page("Walkthroughs", "", sections));
   } catch (Error const& error) {
     std::cerr << error.what() << '\n';

@@ -22,7 +22,7 @@ struct NodeSourceOptions {
   std::string winding = "automatic";  ///< of a model: automatic, keep, flip
   std::optional<double> eye_height;   ///< above the floor, for auto
   std::vector<double> walk;           ///< low and high corner of where eyes are, six numbers, for auto
-  double greatest_gap = 0.002;        ///< PlacementOptions
+  double greatest_gap = 0.03;         ///< PlacementOptions
   double clearance = 0;               ///< PlacementOptions
   std::string hold_out;               ///< of a set: every:N; those views are no nodes
 };

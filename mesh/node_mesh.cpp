@@ -18,6 +18,7 @@
 #include "mesh/greedy_insertion.h"
 #include "mesh/hole_fill.h"
 #include "mesh/joint_fit.h"
+#include "mesh/node_panes.h"
 #include "mesh/node_seams.h"
 #include "mesh/outline.h"
 #include "mesh/outline_triangulation.h"
@@ -54,7 +55,9 @@ class NodeMesher {
     join();
     place_vertices();
     for_each_side([&](std::size_t s) { fit(work_[s]); });
-    return assemble();
+    NodeMesh result = assemble();
+    if (options_.background == NodeMeshOptions::Background::far) add_panes(result, sky);
+    return result;
   }
 
  private:
@@ -350,8 +353,12 @@ std::vector<float> NodeMesh::smooth_quality() const {
 
 void NodeMesh::check() const {
   if (quality.size() != triangles.size()) throw std::logic_error("a node whose qualities are not one a triangle");
-  std::size_t next = 0;
+  std::size_t next = 0, next_pane = 0;
+  panes.check();
   for (Side const& side : sides) {
+    if (side.first_pane != next_pane || side.end_pane < next_pane)
+      throw std::logic_error("a node whose panes do not follow each other");
+    next_pane = side.end_pane;
     if (side.first != next || side.end < side.first)
       throw std::logic_error("a node whose sides do not follow each other");
     next = side.end;
@@ -359,6 +366,7 @@ void NodeMesh::check() const {
         side.feather.size() != side.color.size())
       throw std::logic_error("a side of a node whose picture has another size than its camera's");
   }
+  if (next_pane != panes.triangles.size()) throw std::logic_error("a node with panes of no side");
   if (next != triangles.size()) throw std::logic_error("a node with triangles of no side");
   for (Eigen::Vector3f const& vertex : vertices)
     if (!vertex.allFinite()) throw std::logic_error("a node with a vertex that is not finite");

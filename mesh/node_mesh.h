@@ -6,6 +6,7 @@
 
 #include "acquire/captured_node.h"
 #include "base/context.h"
+#include "mesh/triangle_mesh.h"
 
 namespace scanview {
 
@@ -16,9 +17,10 @@ struct NodeMesh {
   struct Side {
     Camera camera;
     Eigen::Matrix3d node_from_camera = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d gain{1, 1, 1};   ///< View::gain
-    cv::Mat3b color;                 ///< where no triangle is, the nearest colour of one
-    cv::Mat1b feather;               ///< ViewMesh::feather
+    Eigen::Vector3d gain{1, 1, 1};  ///< View::gain
+    cv::Mat3b color;                ///< where no triangle is, the nearest colour of one
+    cv::Mat1b feather;              ///< ViewMesh::feather
+    std::size_t first_pane = 0, end_pane = 0;
     std::size_t first = 0, end = 0;  ///< triangles
   };
   Eigen::Vector3d position{0, 0, 0};  ///< in the scene
@@ -26,7 +28,10 @@ struct NodeMesh {
   std::vector<Eigen::Vector3f> vertices;   ///< on an edge that two sides share, of both
   std::vector<Eigen::Vector3i> triangles;  ///< side after side; (b − a) × (c − a) points towards the node
   std::vector<float> quality;              ///< a triangle: |N · R| (§4.4), 0 to 1
-  double parallax_px = 0;                  ///< the greatest error, NodeMeshOptions::parallax_px, that was left anywhere
+  /// Windows: where from elsewhere the sky is seen that from here something hides. Drawn where nothing else is, with
+  /// the colours that the sky has from here; side after side.
+  TriangleMesh panes;
+  double parallax_px = 0;  ///< the greatest error, NodeMeshOptions::parallax_px, that was left anywhere
 
   /// The quality of every vertex: the mean of its triangles', by their angles there, so that it is smooth (§6.2).
   std::vector<float> smooth_quality() const;
@@ -53,7 +58,7 @@ struct NodeMeshOptions {
   int fill_pixels = 0;                                      ///< MeshOptions::fill_pixels
   int feather_px = 16;                                      ///< MeshOptions::feather_px
   /// far: where nothing is nearer, the sky is drawn, a hundred times as far away as the farthest depth, and at least as
-  /// far that walking moves it by less than a hundredth of a pixel. gap: nothing is there.
+  /// far that walking moves it by less than a hundredth of a pixel, and has panes. gap: nothing is there.
   enum class Background { far, gap } background = Background::far;
   void validate() const;
 };

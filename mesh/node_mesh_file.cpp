@@ -53,8 +53,10 @@ void write_node_mesh(fs::path const& folder, NodeMesh const& node) {
     NodeMesh::Side const& side = node.sides[s];
     Json rotation = Json::array();
     for (int i = 0; i < 9; ++i) rotation.push_back(side.node_from_camera(i / 3, i % 3));
-    json["sides"].push_back(
-        {{"camera", side.camera.to_json()}, {"node_from_camera", rotation}, {"triangles", side.end - side.first}});
+    json["sides"].push_back({{"camera", side.camera.to_json()},
+                             {"node_from_camera", rotation},
+                             {"triangles", side.end - side.first},
+                             {"panes", side.end_pane - side.first_pane}});
     write_file(output.path() / fmt::format("color_{}.png", s), encode_png(side.color));
     write_file(output.path() / fmt::format("feather_{}.png", s), encode_png(side.feather));
   }
@@ -63,6 +65,8 @@ void write_node_mesh(fs::path const& folder, NodeMesh const& node) {
   ply.elements[1].properties.push_back(
       ply_scalar("quality", PlyType::float32, {node.quality.begin(), node.quality.end()}));
   write_file(output.path() / "mesh.ply", format_ply(ply, PlyFormat::binary_little_endian));
+  if (!node.panes.triangles.empty())
+    write_file(output.path() / "panes.ply", format_ply(ply_from_mesh(node.panes), PlyFormat::binary_little_endian));
   write_json(output.path() / "node.json", json);
   output.commit();
 }
@@ -79,7 +83,8 @@ NodeMesh read_node_mesh(fs::path const& folder) {
   Json const& sides = json_member(json, "sides", path);
   if (!sides.is_array() || sides.empty() || sides.size() > kMostSides) bad(path, "sides: must be a list of sides");
   for (std::size_t s = 0; s < sides.size(); ++s) {
-    refuse_unknown_keys(sides[s], {"camera", "node_from_camera", "triangles"}, fmt::format("sides[{}]", s), path);
+    refuse_unknown_keys(sides[s], {"camera", "node_from_camera", "triangles", "panes"}, fmt::format("sides[{}]", s),
+                        path);
     NodeMesh::Side side;
     side.camera = Camera::from_json(json_member(sides[s], "camera", path), path);
     if (!side.camera.is_perspective()) bad(path, "camera: must be perspective");
@@ -88,6 +93,9 @@ NodeMesh read_node_mesh(fs::path const& folder) {
     side.first = s > 0 ? node.sides.back().end : 0;
     side.end = side.first + std::size_t(json_integer(json_member(sides[s], "triangles", path), "triangles", 0,
                                                      kMostTriangles, path));
+    side.first_pane = s > 0 ? node.sides.back().end_pane : 0;
+    side.end_pane = side.first_pane +
+                    std::size_t(json_integer(json_member(sides[s], "panes", path), "panes", 0, kMostTriangles, path));
     fs::path const color = folder / fmt::format("color_{}.png", s), feather = folder / fmt::format("feather_{}.png", s);
     side.color = read_color(color);
     side.feather = read_gray(feather);
@@ -107,6 +115,13 @@ NodeMesh read_node_mesh(fs::path const& folder) {
   if (quality->values.size() != node.triangles.size()) bad(mesh_path, "faces that are not all triangles");
   if (node.sides.back().end != node.triangles.size())
     bad(mesh_path, fmt::format("{} triangles, but node.json names {}", node.triangles.size(), node.sides.back().end));
+  if (node.sides.back().end_pane > 0) {
+    fs::path const panes_path = folder / "panes.ply";
+    node.panes = model_from_ply(read_ply(panes_path), panes_path).mesh;
+    if (node.sides.back().end_pane != node.panes.triangles.size())
+      bad(panes_path,
+          fmt::format("{} triangles, but node.json names {}", node.panes.triangles.size(), node.sides.back().end_pane));
+  }
   for (double const value : quality->values) {
     if (!(value >= 0 && value <= 1)) bad(mesh_path, "a 'quality' that is not between 0 and 1");
     node.quality.push_back(float(value));

@@ -61,6 +61,24 @@ bool is_behind(Eigen::AlignedBox3d const& box, Plane const& plane) {
   return true;
 }
 
+RasterMesh pane_mesh(NodeMesh const& node, NodeMesh::Side const& side) {
+  TriangleMesh mesh;
+  std::vector<int> index(node.panes.vertices.size(), -1);
+  for (std::size_t t = side.first_pane; t < side.end_pane; ++t) {
+    Eigen::Vector3i triangle;
+    for (int i = 0; i < 3; ++i) {
+      int& at = index[node.panes.triangles[t][i]];
+      if (at < 0) {
+        at = int(mesh.vertices.size());
+        mesh.vertices.push_back(node.panes.vertices[node.panes.triangles[t][i]]);
+      }
+      triangle[i] = at;
+    }
+    mesh.triangles.push_back(triangle);
+  }
+  return raster_mesh(mesh, std::vector<std::uint32_t>(mesh.triangles.size(), 65535));
+}
+
 std::vector<float> vertex_quality(NodeMesh const& node, NodeQuality quality, double walking_radius) {
   constexpr float kLeast = 4.0F / 65535;  // in 16 bits still more than nothing
   std::vector<float> result = node.smooth_quality();
@@ -112,6 +130,9 @@ RasterNode::RasterNode(NodeMesh const& node, NodeQuality quality, double walking
       of_vertices.resize(side.mesh.vertices.x.size(), 0.0F);
       side.mesh.vertices.quality = std::move(of_vertices);
     }
+    side.panes = pane_mesh(node, from);
+    for (std::size_t i = 0; i < side.panes.vertices.count; ++i)
+      side.bounds.extend(Vector3d(side.panes.vertices.x[i], side.panes.vertices.y[i], side.panes.vertices.z[i]));
     side.texture_from_node.setZero();
     side.texture_from_node.leftCols<3>() =
         picture_from_camera(from.camera, -atlas.origins[s].x, -atlas.origins[s].y).leftCols<3>() *
@@ -135,8 +156,9 @@ std::size_t RasterNode::bytes() const {
   return count;
 }
 
-bool RasterNode::may_show(Side const& side, Camera const& camera, Eigen::Isometry3d const& node_from_camera) const {
-  if (side.mesh.labels.empty()) return false;
+bool RasterNode::may_show(Side const& side, RasterMesh const& mesh, Camera const& camera,
+                          Eigen::Isometry3d const& node_from_camera) const {
+  if (mesh.labels.empty()) return false;
   Edges frustum, pyramid;
   for (auto const& corner : corners_of(camera)) {
     frustum.origins.push_back(node_from_camera * camera.ray_origin(corner.x(), corner.y()));
@@ -155,7 +177,8 @@ bool RasterNode::may_show(Side const& side, Camera const& camera, Eigen::Isometr
   return true;
 }
 
-LayerRasterizer::Layer RasterNode::layer(Camera const& camera, Eigen::Isometry3d const& scene_from_camera) const {
+LayerRasterizer::Layer RasterNode::layer(Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
+                                         What what) const {
   // In double precision: eye and node may be far from the origin, their difference is not.
   Eigen::Isometry3d node_from_camera = scene_from_camera;
   node_from_camera.translation() -= position_;
@@ -164,9 +187,9 @@ LayerRasterizer::Layer RasterNode::layer(Camera const& camera, Eigen::Isometry3d
   layer.largest_lod = float(texture_.levels.size() - 1);
   layer.culling = Culling::backs_hide;
   for (Side const& side : sides_) {
-    if (!may_show(side, camera, node_from_camera)) continue;
     LayerRasterizer::Part part;
-    part.mesh = &side.mesh;
+    part.mesh = what == What::surfaces ? &side.mesh : &side.panes;
+    if (!may_show(side, *part.mesh, camera, node_from_camera)) continue;
     part.transform = screen_transform(camera, camera_from_node, {nearest_, 0});
     for (int c = 0; c < 4; ++c) {
       part.transform.rows[ScreenTransform::s][c] = side.texture_from_node(0, c);

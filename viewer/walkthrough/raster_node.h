@@ -29,16 +29,19 @@ class RasterNode {
   /// left out whole (§5): those whose pyramid or whose triangles' box lies outside a side of the camera's frustum, or
   /// the frustum outside a side of the pyramid. Backs hide what is behind them: seen from there, a wall is not
   /// transparent.
-  LayerRasterizer::Layer layer(Camera const& camera, Eigen::Isometry3d const& scene_from_camera) const;
+  enum class What { surfaces, panes };
+  LayerRasterizer::Layer layer(Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
+                               What what = What::surfaces) const;
 
  private:
   struct Side {
-    RasterMesh mesh;
+    RasterMesh mesh, panes;
     Eigen::Matrix<double, 3, 4> texture_from_node;  ///< homogeneous texels (s w, t w, w) of a point
     Eigen::AlignedBox3d bounds;                     ///< node coordinates
     std::vector<Eigen::Vector3d> rays;              ///< through the picture's corners, in their order around it
   };
-  bool may_show(Side const& side, Camera const& camera, Eigen::Isometry3d const& node_from_camera) const;
+  bool may_show(Side const& side, RasterMesh const& mesh, Camera const& camera,
+                Eigen::Isometry3d const& node_from_camera) const;
 
   Eigen::Vector3d position_;
   std::vector<Side> sides_;

@@ -187,12 +187,12 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
 }
 
 bool WalkthroughRenderer::fill(Drawn const& node, UsedNode& used, Camera const& camera,
-                               Eigen::Isometry3d const& scene_from_camera, Frame& frame) {
+                               Eigen::Isometry3d const& scene_from_camera, Frame& frame, RasterNode::What what) {
   Gaps const gaps = find_gaps(frame.color);
   if (gaps.count == 0) return false;
   Camera const narrowed = camera.cropped(gaps.area.x, gaps.area.y, gaps.area.width, gaps.area.height);
-  LayerRasterizer::Layer layer = node.node->layer(narrowed, scene_from_camera);
-  used.sides = layer.parts.size();
+  LayerRasterizer::Layer layer = node.node->layer(narrowed, scene_from_camera, what);
+  if (what == RasterNode::What::surfaces) used.sides = layer.parts.size();
   for (LayerRasterizer::Part const& part : layer.parts) used.triangles += part.mesh->labels.size();
   if (layer.parts.empty()) return true;
   layer.wireframe = options_.show == WalkthroughOptions::Show::triangles;
@@ -277,10 +277,13 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
     UsedNode used = all[next];
     auto node = get(used);
     if (!node) continue;
-    open = fill({std::move(node), used.node, 0}, used, camera, scene_from_camera, frame);
+    merged.push_back({std::move(node), used.node, 0});
+    open = fill(merged.back(), used, camera, scene_from_camera, frame, RasterNode::What::surfaces);
     if (open) used_.push_back(used);
     ++filled;
   }
+  for (std::size_t i = 0; open && i < used_.size(); ++i)
+    open = fill(merged[i], used_[i], camera, scene_from_camera, frame, RasterNode::What::panes);
   uncovered_ = find_gaps(frame.color).count;
   if (uncovered_ > 0 && options_.gaps == VisibilityGaps::interpolated) interpolate_gaps(frame);
   stages_["gaps"] = milliseconds_since(filling);

@@ -22,7 +22,7 @@ struct UsedNode {
 
 /// Draws a scene from its nodes (Darsa 1998), with the CPU rasteriser: the nodes nearest to the eye are warped by
 /// drawing their triangles and merged by the compositor (SoftZ) as the policy says; what none of them shows is looked
-/// for in further nodes, in the gaps alone.
+/// for in further nodes, in the gaps alone, and at last in the nodes' panes.
 class WalkthroughRenderer final : public Renderer {
  public:
   /// threads: at most so many; 0: all processors. Throws Error{usage}, and Error{bad_input} for a library without
@@ -61,7 +61,7 @@ class WalkthroughRenderer final : public Renderer {
   void draw(std::vector<Drawn> const& nodes, Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
             cv::Mat4b color, cv::Mat1f depth);
   bool fill(Drawn const& node, UsedNode& used, Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
-            Frame& frame);
+            Frame& frame, RasterNode::What what);
 
   std::shared_ptr<NodeLibrary> library_;
   WalkthroughOptions options_;
