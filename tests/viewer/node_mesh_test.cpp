@@ -175,7 +175,8 @@ TEST(NodeMesh, SidesMayHaveAnyFieldsOfViewAndShareNothing) {
   CapturedNode node{"000", Vector3d::Zero(), {}};
   node.sides.push_back(node_side(scene, square_camera(40, 60), scene_from_cube_side(0, Vector3d::Zero())));
   NodeMesh const one = mesh_of(node);
-  node.sides.push_back(node_side(scene, Camera::perspective(64, 24, 25, 20, 30, 12), look_at({0, 0, 0}, {0.3, 0.1, -1})));
+  node.sides.push_back(
+      node_side(scene, Camera::perspective(64, 24, 25, 20, 30, 12), look_at({0, 0, 0}, {0.3, 0.1, -1})));
   NodeMesh const two = mesh_of(node);
   ASSERT_EQ(one.sides.size(), 1U);
   ASSERT_EQ(two.sides.size(), 2U);
