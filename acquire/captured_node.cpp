@@ -1,6 +1,7 @@
 #include "acquire/captured_node.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -9,6 +10,13 @@
 
 namespace scanview {
 namespace {
+
+/// The first of two pixels around the middle of pixel `at` of the coarser picture, whose pixels are of one size, two
+/// and more, all over the finer one.
+int first_of_two(int at, int coarse, int fine) {
+  double const middle = (at + 0.5) * fine / coarse - 0.5;
+  return std::clamp(int(std::lround(middle - 0.5)), 0, std::max(fine - 2, 0));
+}
 
 RangeImage half_image(RangeImage const& image) {
   Camera const& camera = image.camera;
@@ -22,9 +30,11 @@ RangeImage half_image(RangeImage const& image) {
       double light[3] = {}, inverse = 0, sigma = 0;
       float nearest = std::numeric_limits<float>::infinity();
       int pixels = 0, depths = 0;
+      int const left = first_of_two(x, half.depth.cols, image.depth.cols);
+      int const top = first_of_two(y, half.depth.rows, image.depth.rows);
       auto const for_each = [&](auto const& act) {
-        for (int v = 2 * y; v < std::min(2 * y + 2, image.depth.rows); ++v)
-          for (int u = 2 * x; u < std::min(2 * x + 2, image.depth.cols); ++u) act(u, v);
+        for (int v = top; v < std::min(top + 2, image.depth.rows); ++v)
+          for (int u = left; u < std::min(left + 2, image.depth.cols); ++u) act(u, v);
       };
       for_each([&](int u, int v) {
         ++pixels;
@@ -39,7 +49,7 @@ RangeImage half_image(RangeImage const& image) {
       });
       for (int c = 0; c < 3; ++c)
         half.color(y, x)[c] = cv::saturate_cast<uchar>(255 * srgb_from_linear(light[c] / pixels));
-      half.classes(y, x) = depths > 0 ? static_cast<uchar>(PixelClass::object) : image.classes(2 * y, 2 * x);
+      half.classes(y, x) = depths > 0 ? static_cast<uchar>(PixelClass::object) : image.classes(top, left);
       if (depths == 0) continue;
       half.depth(y, x) = float(depths / inverse);
       half.sigma(y, x) = float(sigma);

@@ -18,6 +18,7 @@
 #include "mesh/greedy_insertion.h"
 #include "mesh/hole_fill.h"
 #include "mesh/joint_fit.h"
+#include "mesh/node_gutter.h"
 #include "mesh/node_panes.h"
 #include "mesh/node_seams.h"
 #include "mesh/outline.h"
@@ -39,7 +40,8 @@ void require(bool holds, char const* what) {
 struct Work {
   RangeImage image;     ///< with the sky where it is far
   cv::Mat1f tolerance;  ///< of depth
-  SurfaceLinks steps;   ///< links as the depths are; those of `side` may cross steps (Silhouettes::torn)
+  cv::Mat1b feather;
+  SurfaceLinks steps;  ///< links as the depths are; those of `side` may cross steps (Silhouettes::torn)
   SideTriangulation side;
   double worst = 0;  ///< error, in tolerances
 };
@@ -47,11 +49,12 @@ struct Work {
 class NodeMesher {
  public:
   NodeMesher(CapturedNode const& node, NodeMeshOptions const& options, Context& context)
-      : node_(node), options_(options), context_(context), work_(node.sides.size()) {}
+      : node_(node), options_(options), context_(context), sides_(node.sides), work_(node.sides.size()) {}
 
   NodeMesh run() {
     double const sky = sky_depth();
-    for_each_side([&](std::size_t s) { prepare(s, sky); });
+    for_each_side([&](std::size_t s) { put_image(s, sky); });
+    for_each_side([&](std::size_t s) { prepare(s); });
     join();
     place_vertices();
     for_each_side([&](std::size_t s) { fit(work_[s]); });
@@ -85,16 +88,25 @@ class NodeMesher {
     return depth;
   }
 
-  void prepare(std::size_t s, double sky) {
-    View const& view = node_.sides[s];
+  void put_image(std::size_t s, double sky) {
+    RangeImage& image = sides_[s].image;
+    if (options_.background == NodeMeshOptions::Background::far) put_sky(image, sky);
+    if (options_.fill_pixels > 0) image = fill_small_holes(image, options_.step_sigmas, options_.fill_pixels);
+  }
+
+  void prepare(std::size_t s) {
     Work& work = work_[s];
-    work.image = view.image;
-    if (options_.background == NodeMeshOptions::Background::far) put_sky(work.image, sky);
-    if (options_.fill_pixels > 0) work.image = fill_small_holes(work.image, options_.step_sigmas, options_.fill_pixels);
-    Camera const& camera = work.image.camera;
-    work.steps = find_surface_links(work.image, options_.step_sigmas, options_.min_patch_pixels);
-    work.side.camera = camera;
-    work.side.node_from_camera = view.object_from_camera->linear();
+    work.image = sides_[s].image;
+    constexpr int kStepReach = 3;  // pixels that the decision about a step looks at
+    int const gutter = std::max(kStepReach, options_.feather_px);
+    RangeImage const wide = with_gutter(sides_, s, gutter);
+    SurfaceLinks const links = find_surface_links(wide, options_.step_sigmas, options_.min_patch_pixels);
+    cv::Rect const inside(gutter, gutter, work.image.camera.width(), work.image.camera.height());
+    work.feather = feather_weights(links.object * 255, links, options_.feather_px)(inside).clone();
+    work.side.beyond = beyond_edges(wide, links, gutter);
+    work.steps = without_gutter(links, gutter);
+    work.side.camera = work.image.camera;
+    work.side.node_from_camera = sides_[s].object_from_camera->linear();
     work.side.links = work.steps;
     if (options_.silhouettes == NodeMeshOptions::Silhouettes::torn) link_everything(work.side.links);
     find_tolerances(work);
@@ -312,7 +324,7 @@ class NodeMesher {
   void paint(Work const& work, Vector3d const& gain, NodeMesh::Side& side) const {
     ViewMesh covered;
     covered.camera = side.camera;
-    covered.feather = feather_weights(work.steps.object * 255, work.steps, options_.feather_px);
+    covered.feather = work.feather;
     side.color = padded_texture(work.image, covered);
     if (gain != Vector3d::Ones()) {
       cv::Mat3b table(1, 256);
@@ -329,6 +341,7 @@ class NodeMesher {
   CapturedNode const& node_;
   NodeMeshOptions const& options_;
   Context& context_;
+  std::vector<View> sides_;  ///< with the sky where it is far
   std::vector<Work> work_;
 };
 

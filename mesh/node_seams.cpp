@@ -19,6 +19,7 @@ struct Frame {
   Vector2d start;  ///< the corner of the picture where it begins
   Vector2d along, inward;
   int count = 0;
+  int edge = 0;  ///< SideTriangulation::beyond
 
   Vector2d at(double place) const { return start + (place + 0.5) * along; }
   Eigen::Vector2i pixel(int i, int row) const {
@@ -36,13 +37,13 @@ Frame frame_of(Camera const& camera, int edge) {
   double const w = camera.width(), h = camera.height();
   switch (edge) {
     case 0:
-      return {{-0.5, -0.5}, {1, 0}, {0, 1}, camera.width()};
+      return {{-0.5, -0.5}, {1, 0}, {0, 1}, camera.width(), 0};
     case 1:
-      return {{w - 0.5, -0.5}, {0, 1}, {-1, 0}, camera.height()};
+      return {{w - 0.5, -0.5}, {0, 1}, {-1, 0}, camera.height(), 1};
     case 2:
-      return {{w - 0.5, h - 0.5}, {-1, 0}, {0, -1}, camera.width()};
+      return {{w - 0.5, h - 0.5}, {-1, 0}, {0, -1}, camera.width(), 2};
     default:
-      return {{-0.5, h - 0.5}, {0, -1}, {1, 0}, camera.height()};
+      return {{-0.5, h - 0.5}, {0, -1}, {1, 0}, camera.height(), 3};
   }
 }
 
@@ -87,6 +88,7 @@ struct Profile {
   std::vector<double> reach;    ///< by how much those two differ
   std::vector<char> is_object;  ///< a pixel
   std::vector<char> linked;     ///< pixel i with the next one
+  std::vector<char> goes_on;    ///< pixel i with what lies beyond the edge
 };
 
 Profile profile_of(SideTriangulation const& side, Seam const& seam, int which) {
@@ -95,7 +97,9 @@ Profile profile_of(SideTriangulation const& side, Seam const& seam, int which) {
     int const i = seam.index(which, k);
     Eigen::Vector2i const p = seam.frame[which].pixel(i, 0), q = seam.frame[which].pixel(i, 1);
     double const near = side.field.depth(p.y(), p.x());
-    double depth = near, reach = 0;
+    auto const& beyond = side.beyond[std::size_t(seam.frame[which].edge)];
+    double const next_side = beyond.empty() ? 0 : beyond[std::size_t(i)];
+    double depth = next_side > 0 ? (near + next_side) / 2 : near, reach = 0;
     if (side.links.is_object(p.x(), p.y()) && side.links.is_object(q.x(), q.y()) &&
         side.links.linked(p.x(), p.y(), q.x(), q.y())) {
       reach = std::abs(near - side.field.depth(q.y(), q.x()));
@@ -111,6 +115,7 @@ Profile profile_of(SideTriangulation const& side, Seam const& seam, int which) {
                side.links.linked(p.x(), p.y(), next.x(), next.y());
     }
     profile.linked.push_back(linked);
+    profile.goes_on.push_back(next_side > 0);
   }
   return profile;
 }
@@ -148,7 +153,8 @@ class SeamPlan {
     for (int i = 0; i < count_; ++i) {
       double const off = std::abs(profiles_[0].depth[i] - profiles_[1].depth[i]);
       double const allowed = std::max({tolerance, profiles_[0].reach[i], profiles_[1].reach[i]});
-      shared_.push_back(profiles_[0].is_object[i] && profiles_[1].is_object[i] && off <= allowed);
+      bool const goes_on = profiles_[0].goes_on[i] && profiles_[1].goes_on[i];
+      shared_.push_back(profiles_[0].is_object[i] && profiles_[1].is_object[i] && (goes_on || off <= allowed));
       if (!shared_[i]) continue;
       double const mean = (profiles_[0].depth[i] + profiles_[1].depth[i]) / 2;
       profiles_[0].depth[i] = profiles_[1].depth[i] = mean;

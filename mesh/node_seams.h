@@ -18,6 +18,9 @@ struct SideTriangulation {
   SurfaceLinks links;
   DepthField field;
   DepthTriangulation triangulation;
+  /// An edge of the picture, clockwise from the upper left corner: the linear depth, in this camera, of what lies
+  /// beyond each of its pixels and is linked to it; 0: nothing is. May be empty.
+  std::array<std::vector<double>, 4> beyond;
 };
 
 /// Gives sides whose pictures share an edge of their pyramids the same vertices along it, with the same linear depths,

@@ -170,12 +170,29 @@ TEST(NodeMesh, DepthsFromOneToAMillionInOneNode) {
   EXPECT_NEAR(near.depth(4, 4), 0.5, 0.05);  // its tolerance of 1/z: 0.25 / 32 at 1
 }
 
+TEST(NodeMesh, WhatIsNearIsDrawnHoweverFarTheRestIs) {
+  // A card of a few vertices, hills whose outlines take many, mountains a million units away, or the sky: 10^8 then.
+  std::vector<Surface> parts = {solid_box({-0.2, -0.2, -2.1}, {0.2, 0.2, -2}, by_direction(3))};
+  for (int i = 0; i < 12; ++i)
+    parts.push_back(sphere(5e5 * Vector3d(std::cos(0.5 * i + 0.3), 0, std::sin(0.5 * i + 0.3)), 1e5));
+  std::vector<Surface> with_mountains = parts;
+  with_mountains.push_back(globe({0, 0, 0}, 1e6, by_direction(3)));
+  for (auto const& scene : {together(with_mountains), together(parts)}) {
+    auto renderer = renderer_of({mesh_of(capture_cube(scene, Vector3d::Zero(), 64))}, 1);
+    for (double const z : {0.0, -0.5, -1.0, -1.8})
+      EXPECT_NEAR(renderer.render(square_camera(9, 9), look_at({0, 0, z}, {0, 0, -3})).depth(4, 4), 2 + z,
+                  4 * 0.25 / 32 * 1.1)  // the parallax in 1/z, as a depth
+          << z;
+  }
+}
+
 TEST(NodeMesh, SidesMayHaveAnyFieldsOfViewAndShareNothing) {
   Surface const scene = room(2, by_direction(5));
   CapturedNode node{"000", Vector3d::Zero(), {}};
   node.sides.push_back(node_side(scene, square_camera(40, 60), scene_from_cube_side(0, Vector3d::Zero())));
   NodeMesh const one = mesh_of(node);
-  node.sides.push_back(node_side(scene, Camera::perspective(64, 24, 25, 20, 30, 12), look_at({0, 0, 0}, {0.3, 0.1, -1})));
+  node.sides.push_back(
+      node_side(scene, Camera::perspective(64, 24, 25, 20, 30, 12), look_at({0, 0, 0}, {0.3, 0.1, -1})));
   NodeMesh const two = mesh_of(node);
   ASSERT_EQ(one.sides.size(), 1U);
   ASSERT_EQ(two.sides.size(), 2U);

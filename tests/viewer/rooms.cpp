@@ -147,6 +147,23 @@ Eigen::Isometry3d random_look(Vector3d const& eye, CounterRandom& random) {
   return look_at(eye, eye + to, to.cross(random_direction(random)).normalized());
 }
 
+std::optional<TriangleHit> meet(NodeMesh const& mesh, Vector3d const& origin, Vector3d const& direction) {
+  std::optional<TriangleHit> nearest;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    // origin + s d = Σ wᵢ pᵢ, Σ wᵢ = 1
+    Eigen::Matrix4d m;
+    for (int i = 0; i < 3; ++i) {
+      m.col(i).head<3>() = mesh.position + mesh.vertices[mesh.triangles[t][i]].cast<double>();
+      m(3, i) = 1;
+    }
+    m.col(3) << -direction, 0;
+    Eigen::Vector4d const solved = m.partialPivLu().solve(Eigen::Vector4d(origin.x(), origin.y(), origin.z(), 1));
+    if (!(solved.head<3>().minCoeff() >= -1e-9 && solved[3] > 0)) continue;
+    if (!nearest || solved[3] < nearest->t) nearest = TriangleHit{t, solved.head<3>(), solved[3]};
+  }
+  return nearest;
+}
+
 Camera square_camera(int size, double focal) {
   return Camera::perspective(size, size, focal, focal, 0.5 * (size - 1), 0.5 * (size - 1));
 }

@@ -46,6 +46,13 @@ WalkthroughRenderer renderer_of(std::vector<NodeMesh> const& nodes, double walki
 /// An even direction; a camera at `eye` that looks there, rolled at random.
 Eigen::Vector3d random_direction(CounterRandom& random);
 Eigen::Isometry3d random_look(Eigen::Vector3d const& eye, CounterRandom& random);
+/// Which triangle of a node's a ray meets first, and the weights of its corners there; by brute force.
+struct TriangleHit {
+  std::size_t triangle = 0;
+  Eigen::Vector3d weights{0, 0, 0};
+  double t = 0;
+};
+std::optional<TriangleHit> meet(NodeMesh const& mesh, Eigen::Vector3d const& origin, Eigen::Vector3d const& direction);
 Camera square_camera(int size, double focal);
 std::size_t gaps(Frame const& frame);
 /// z in the camera of what a pixel's ray meets; 0: nothing.

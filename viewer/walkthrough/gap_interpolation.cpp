@@ -12,6 +12,8 @@ namespace {
 /// Linear light B G R and depth; depth 0: nothing.
 using Level = cv::Mat4f;
 
+constexpr float kBehind = 0.5F;  ///< of the farthest: what is nearer does not count
+
 Level full_level(Frame const& frame) {
   auto const& linear = linear_from_srgb8();
   Level level(frame.color.size(), cv::Vec4f(0, 0, 0, 0));
@@ -38,7 +40,7 @@ Level half_of(Level const& fine) {
       cv::Vec4f sum(0, 0, 0, 0);
       int count = 0;
       for_each([&](cv::Vec4f const& p) {
-        if (p[3] < 0.5F * farthest) return;
+        if (p[3] < kBehind * farthest) return;
         sum += p;
         ++count;
       });
@@ -56,8 +58,18 @@ void fill_from(Level const& coarse, Level& fine) {
       int const left = int(cx), top = int(cy), right = std::min(left + 1, coarse.cols - 1),
                 bottom = std::min(top + 1, coarse.rows - 1);
       float const u = cx - float(left), v = cy - float(top);
-      fine(y, x) = (1 - v) * ((1 - u) * coarse(top, left) + u * coarse(top, right)) +
-                   v * ((1 - u) * coarse(bottom, left) + u * coarse(bottom, right));
+      cv::Vec4f const around[4] = {coarse(top, left), coarse(top, right), coarse(bottom, left), coarse(bottom, right)};
+      float const share[4] = {(1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u};
+      float farthest = 0, total = 0;
+      for (int i = 0; i < 4; ++i)
+        if (share[i] > 0) farthest = std::max(farthest, around[i][3]);
+      cv::Vec4f sum(0, 0, 0, 0);
+      for (int i = 0; i < 4; ++i) {
+        if (around[i][3] < kBehind * farthest) continue;
+        sum += share[i] * around[i];
+        total += share[i];
+      }
+      fine(y, x) = sum / total;
     }
 }
 

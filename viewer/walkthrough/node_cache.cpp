@@ -53,7 +53,9 @@ class NodeCache final : public NodeLibrary {
     if (slot.node) return slot.node;
     ask({node, *level});
     if (wait == Wait::yes) {
+      ++slot.waiting;
       done_.wait(lock, [&] { return slot.node || !failures_[node][*level].empty(); });
+      --slot.waiting;
       if (slot.node) return slot.node;
       lock.unlock();
       return get(node, distance, wait);
@@ -126,6 +128,7 @@ class NodeCache final : public NodeLibrary {
   struct Slot {
     std::shared_ptr<RasterNode const> node;
     std::uint64_t used = 0;
+    int waiting = 0;  ///< threads that wait for it: what is read meanwhile does not push it out
   };
   struct Wanted {
     std::size_t node, level;
@@ -174,7 +177,8 @@ class NodeCache final : public NodeLibrary {
       }
       lock.lock();
       failures_[node][level] = failure;
-      slots_[node][level] = {read, clock_};
+      slots_[node][level].node = read;
+      slots_[node][level].used = clock_;
       is_reading_asked_ = false;
       ++settled_;
       if (read) {
@@ -192,7 +196,7 @@ class NodeCache final : public NodeLibrary {
       for (std::size_t n = 0; n < slots_.size(); ++n)
         for (std::size_t l = 0; l < slots_[n].size(); ++l) {
           Slot& slot = slots_[n][l];
-          if (!slot.node || Wanted{n, l} == just_read) continue;
+          if (!slot.node || slot.waiting > 0 || Wanted{n, l} == just_read) continue;
           if (oldest == nullptr || slot.used < oldest->used) oldest = &slot;
         }
       if (oldest == nullptr) return;

@@ -99,8 +99,11 @@ RasterNode::RasterNode(NodeMesh const& node, NodeQuality quality, double walking
       quality == NodeQuality::flat ? std::vector<float>() : vertex_quality(node, quality, walking_radius);
   std::vector<double> distances;
   for (auto const& vertex : node.vertices) distances.push_back(vertex.cast<double>().norm());
-  constexpr double kNearest = 1e-6;
-  nearest_ = distances.empty() ? 0 : kNearest * median(distances);
+  // Most of a node may be far away, as the sky is, and what is near still be looked at from nearby.
+  constexpr double kOfMedian = 1e-6, kOfNearest = 1e-3;
+  if (!distances.empty())
+    nearest_ =
+        std::min(kOfMedian * median(distances), kOfNearest * *std::min_element(distances.begin(), distances.end()));
   for (std::size_t s = 0; s < node.sides.size(); ++s) {
     NodeMesh::Side const& from = node.sides[s];
     Side side;
