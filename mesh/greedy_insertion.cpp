@@ -139,25 +139,80 @@ int VertexMaker::split_border(DepthTriangulation& triangulation, int t, Eigen::V
     double const along = (point - u).dot(edge) / edge.squaredNorm();
     Eigen::Vector2d const place = u + along * edge;
     if ((place - u).norm() < kApart || (place - v).norm() < kApart) continue;
-    // The surface there is that of the nearest pixel on this side of the border.
-    int best_x = -1, best_y = -1;
-    double nearest = INFINITY;
-    for (int y = int(std::floor(place.y())); y <= int(std::ceil(place.y())); ++y)
-      for (int x = int(std::floor(place.x())); x <= int(std::ceil(place.x())); ++x) {
-        if (!links_.is_object(x, y)) continue;
-        Eigen::Vector2d const to = Eigen::Vector2d(x, y) - place;
-        if (!(edge.x() * to.y() - edge.y() * to.x() > 0) || !(to.norm() < nearest)) continue;
-        nearest = to.norm();
-        best_x = x;
-        best_y = y;
-      }
-    double depth = (1 - along) * shape.depth[(i + 1) % 3] + along * shape.depth[(i + 2) % 3];
-    if (best_x >= 0)
-      depth = extend(fit_local_surface(image_, links_, best_x, best_y, tolerance_(best_y, best_x)),
-                     place - Eigen::Vector2d(best_x, best_y));
+    BorderDepth const beside = border_depth(place, edge);
+    double const depth =
+        beside.x >= 0 ? beside.depth : (1 - along) * shape.depth[(i + 1) % 3] + along * shape.depth[(i + 2) % 3];
     return triangulation.split_edge(t, i, place, depth);
   }
   return -1;
+}
+
+VertexMaker::BorderDepth VertexMaker::border_depth(Eigen::Vector2d const& place, Eigen::Vector2d const& edge) const {
+  BorderDepth result;
+  double nearest = INFINITY;
+  for (int y = int(std::floor(place.y())); y <= int(std::ceil(place.y())); ++y)
+    for (int x = int(std::floor(place.x())); x <= int(std::ceil(place.x())); ++x) {
+      if (!links_.is_object(x, y)) continue;
+      Eigen::Vector2d const to = Eigen::Vector2d(x, y) - place;
+      if (!(edge.x() * to.y() - edge.y() * to.x() > 0) || !(to.norm() < nearest)) continue;
+      nearest = to.norm();
+      result.x = x;
+      result.y = y;
+    }
+  if (result.x >= 0)
+    result.depth = extend(fit_local_surface(image_, links_, result.x, result.y, tolerance_(result.y, result.x)),
+                          place - Eigen::Vector2d(result.x, result.y));
+  return result;
+}
+
+int VertexMaker::split_border_off(DepthTriangulation& triangulation, int t, int i, DepthField const& field,
+                                  double limit) const {
+  int const from = triangulation.triangle(t).vertex[(i + 1) % 3], to = triangulation.triangle(t).vertex[(i + 2) % 3];
+  if (triangulation.vertex(from).is_held && triangulation.vertex(to).is_held) return -1;
+  DepthTriangulation::Vertex const u = triangulation.vertex(from), v = triangulation.vertex(to);
+  Eigen::Vector2d const edge = v.position - u.position;
+  int const count = int(edge.norm());  // pieces of a pixel or more
+  double worst = limit, depth = 0;
+  int at = -1;
+  for (int k = 1; k < count; ++k) {
+    double const along = double(k) / count;
+    BorderDepth const beside = border_depth(u.position + along * edge, edge);
+    if (beside.x < 0) continue;
+    double const off = std::abs((1 - along) * u.depth + along * v.depth - beside.depth);
+    double const error = off * double(field.weight(beside.y, beside.x));
+    if (!(error > worst)) continue;
+    worst = error;
+    depth = beside.depth;
+    at = k;
+  }
+  if (at < 0) return -1;
+  return triangulation.split_edge(t, i, u.position + double(at) / count * edge, depth);
+}
+
+void refine_border(DepthTriangulation& triangulation, DepthField const& field, VertexMaker const& maker, double limit,
+                   int max_triangles) {
+  struct BorderEdge {
+    int triangle, corner;
+  };
+  std::vector<BorderEdge> open;
+  for (int t = 0; t < int(triangulation.triangles().size()); ++t)
+    for (int i = 0; i < 3 && triangulation.alive(t); ++i)
+      if (triangulation.triangle(t).next[i] < 0) open.push_back({t, i});
+  std::vector<int> added;
+  while (!open.empty()) {
+    auto const [t, i] = open.back();
+    open.pop_back();
+    if (max_triangles > 0 && triangulation.count() + 1 > max_triangles) break;
+    int const vertex = maker.split_border_off(triangulation, t, i, field, limit);
+    if (vertex < 0) continue;
+    added.push_back(vertex);
+    // What splitting leaves: both pieces opposite corner 0, the second in a new triangle; a second border edge of the
+    // triangle, if it had one, in one of the two.
+    for (int const piece : {t, int(triangulation.triangles().size()) - 1})
+      for (int corner = 0; corner < 3; ++corner)
+        if (triangulation.triangle(piece).next[corner] < 0) open.push_back({piece, corner});
+  }
+  for (int const vertex : added) triangulation.restore_delaunay(vertex);
 }
 
 void insert_greedily(DepthTriangulation& triangulation, DepthField const& field, VertexMaker const& maker, double limit,

@@ -20,13 +20,29 @@ class VertexMaker {
   /// that it made, or −1 where no edge is so (held vertices keep theirs whole), or where vertices are plain, not
   /// smooth.
   int split_border(DepthTriangulation& triangulation, int t, Eigen::Vector2d const& point) const;
+  /// Halves the border edge opposite corner i where the surface beside it is farther off its line than anywhere else
+  /// along it and by more than `limit` tolerances: no pixel's error tells, for none lies on it, but from the side it
+  /// would be seen as a skin that hangs in a depth step. The vertex, or −1 where the edge keeps the limit or is held.
+  int split_border_off(DepthTriangulation& triangulation, int t, int i, DepthField const& field, double limit) const;
 
  private:
+  /// The linear depth of a place on a border edge from u to v, by the nearest pixel of the object on the edge's side.
+  struct BorderDepth {
+    double depth = 0;
+    int x = -1, y = -1;  ///< that pixel; −1: none is near
+  };
+  BorderDepth border_depth(Eigen::Vector2d const& place, Eigen::Vector2d const& edge) const;
+
   RangeImage const& image_;
   SurfaceLinks const& links_;
   cv::Mat1f const& tolerance_;
   bool smooth_;
 };
+
+/// Gives the border vertices wherever VertexMaker::split_border_off() finds it off by more than `limit` tolerances, but
+/// makes no more than `max_triangles` (0: no limit). Linear in the border's pixels, times the depth of the halving.
+void refine_border(DepthTriangulation& triangulation, DepthField const& field, VertexMaker const& maker, double limit,
+                   int max_triangles);
 
 /// Refines a triangulation by greedy insertion (Garland and Heckbert 1995, algorithm III): of all pixels the one that
 /// is worst off, by error in tolerances, becomes a vertex, edges around it are flipped until they are Delaunay, only

@@ -224,6 +224,8 @@ class NodeMesher {
   void place_within(Work& work, double limit, int most) {
     bool const smooth = options_.fit != NodeMeshOptions::Fit::none;
     VertexMaker const maker(work.image, work.side.links, work.tolerance, smooth);
+    if (options_.silhouettes == NodeMeshOptions::Silhouettes::constrained)
+      refine_border(work.side.triangulation, work.side.field, maker, limit, most);
     if (options_.placement == NodeMeshOptions::Placement::probing)
       probe_voronoi_edges(work.side.triangulation, work.side.field, maker, limit, most, context_);
     else
