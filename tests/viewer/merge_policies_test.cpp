@@ -244,5 +244,29 @@ TEST(MergePolicies, FillingChangesOnlyGaps) {
     }
 }
 
+TEST(MergePolicies, PicturesOfAnySizeAreFilled) {
+  // Wider than the rasteriser draws at once, with gaps at both ends: as of eight samples a pixel.
+  std::vector<NodeMesh> nodes;
+  for (double const x : {0.0, 0.1}) {
+    CapturedNode node{"000", {x, 0, 0}, {}};
+    double const focal = x == 0 ? 40 : 12;
+    node.sides.push_back(
+        node_side(room(kHalf, plain({0.3, 0.3, 0.3})), square_camera(24, focal), look_at({x, 0, 0}, {x, 0, -1})));
+    nodes.push_back(mesh_of(node));
+  }
+  WalkthroughOptions options;
+  options.merged = 1;
+  auto renderer = renderer_of(nodes, 1, options);
+  Camera const small = Camera::perspective(40, 2, 20, 20, 19.5, 0.5);
+  Eigen::Isometry3d const pose = look_at({0.01, 0, 0}, {0.01, 0, -1});
+  Frame const coarse = renderer.render(small, pose);
+  Frame const fine = renderer.render(small.resized(5000, 250), pose);
+  // The same shares of both are covered, but for the pixels of outlines: four columns of the coarse one.
+  double const share = double(gaps(fine)) / double(fine.color.total());
+  EXPECT_NEAR(share, double(gaps(coarse)) / double(coarse.color.total()), 4.0 / 40);
+  EXPECT_LT(share, 0.5);
+  for (int const x : {900, 2500, 4100}) EXPECT_EQ(fine.color(125, x)[3], 255) << x;
+}
+
 }  // namespace
 }  // namespace scanview::test

@@ -155,6 +155,26 @@ TEST(NodeMesh, AHairThinColumnStandsAlone) {
     }
 }
 
+TEST(NodeMesh, AHairThinColumnIsSeenAndNothingHangsOnIt) {
+  CapturedNode const node = capture_cube(thin_column(), Vector3d::Zero(), 64);
+  View const& side = node.sides[5];  // towards -z
+  auto renderer = renderer_of({mesh_of(node)}, 1);
+  Frame const centre = renderer.render(side.image.camera, *side.object_from_camera);
+  std::size_t of_column = 0;
+  for (int y = 0; y < centre.depth.rows; ++y)
+    for (int x = 0; x < centre.depth.cols; ++x) {
+      bool const is_column = side.image.depth(y, x) < 0.6;
+      of_column += is_column;
+      EXPECT_EQ(centre.depth(y, x) < 0.6, is_column) << x << ' ' << y;
+    }
+  EXPECT_GE(of_column, 64U);
+  // From elsewhere each sample is of the column, of the wall, or missing: the column's depth from the eye is 0.5 ± 0.2.
+  for (Vector3d const& eye : {Vector3d(0.2, 0, 0), Vector3d(-0.2, 0.1, 0.1), Vector3d(0.05, 0.05, 0.2)}) {
+    Frame const frame = renderer.render(square_camera(96, 48), look_at(eye, eye - Vector3d::UnitZ()));
+    for (float const z : cv::Mat1f(frame.depth)) EXPECT_TRUE(std::isnan(z) || z < 0.75 || z > 2.75) << z;
+  }
+}
+
 TEST(NodeMesh, DepthsFromOneToAMillionInOneNode) {
   // A floor a unit below the eye, a wall at a million, a ball at one.
   Surface const scene =

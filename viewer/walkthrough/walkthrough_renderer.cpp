@@ -44,6 +44,14 @@ Gaps find_gaps(cv::Mat4b const& color) {
   return {count, cv::Rect(left, top, right - left + 1, bottom - top + 1)};
 }
 
+/// The parts of a picture that the rasteriser draws at once.
+template <typename Do>
+void for_each_block(Camera const& camera, Do const& act) {
+  for (int y = 0; y < camera.height(); y += kBlock)
+    for (int x = 0; x < camera.width(); x += kBlock)
+      act(cv::Rect(x, y, std::min(kBlock, camera.width() - x), std::min(kBlock, camera.height() - y)));
+}
+
 void require(bool holds, char const* what) {
   if (!holds) throw Error(ErrorCode::usage, {}, std::string("walkthrough options: ") + what);
 }
@@ -172,16 +180,26 @@ bool WalkthroughRenderer::fill(Drawn const& node, UsedNode& used, Camera const& 
   used.sides = layer.parts.size();
   for (LayerRasterizer::Part const& part : layer.parts) used.triangles += part.mesh->labels.size();
   if (layer.parts.empty()) return true;
+  for_each_block(narrowed, [&](cv::Rect const& block) {
+    cv::Rect const area = block + gaps.area.tl();
+    fill_gaps(node, narrowed.cropped(block.x, block.y, block.width, block.height), scene_from_camera, frame.color(area),
+              frame.depth(area));
+  });
+  return true;
+}
+
+void WalkthroughRenderer::fill_gaps(Drawn const& node, Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
+                                    cv::Mat4b color, cv::Mat1f depth) {
+  LayerRasterizer::Layer const layer = node.node->layer(camera, scene_from_camera);
+  if (layer.parts.empty()) return;
   ComposedLayer compose;
   compose.texture = &node.node->texture();
   compose.weight = 1;
   SoftZ soft_z;
   soft_z.nearest = true;
   Composition const how = composition(soft_z, camera);
-  Frame patch = new_frame(narrowed.width(), narrowed.height());
-  cv::Mat4b color = frame.color(gaps.area);
-  cv::Mat1f depth = frame.depth(gaps.area);
-  rasterizer_.draw({layer}, narrowed.width(), narrowed.height(), [&](LayerRasterizer::Tile& tile) {
+  Frame patch = new_frame(camera.width(), camera.height());
+  rasterizer_.draw({layer}, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
     constexpr std::size_t kMask = 2;  // measured_layers() uses the others
     float* const open = tile.scratch(kMask);
     std::fill_n(open, LayerRasterizer::kTilePixels, 0.0F);
@@ -206,7 +224,6 @@ bool WalkthroughRenderer::fill(Drawn const& node, UsedNode& used, Camera const& 
         depth(y, x) = patch.depth(y, x);
       }
   });
-  return true;
 }
 
 Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const& scene_from_camera) {
@@ -243,12 +260,10 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
       last_.color.size() != cv::Size(camera.width(), camera.height()))
     last_ = new_frame(camera.width(), camera.height());
   Frame frame = last_;
-  for (int y = 0; y < camera.height(); y += kBlock)
-    for (int x = 0; x < camera.width(); x += kBlock) {
-      cv::Rect const block(x, y, std::min(kBlock, camera.width() - x), std::min(kBlock, camera.height() - y));
-      draw(merged, camera.cropped(x, y, block.width, block.height), scene_from_camera, frame.color(block),
-           frame.depth(block));
-    }
+  for_each_block(camera, [&](cv::Rect const& block) {
+    draw(merged, camera.cropped(block.x, block.y, block.width, block.height), scene_from_camera, frame.color(block),
+         frame.depth(block));
+  });
   stages_ = {{"merge", milliseconds_since(start)}};
 
   auto const filling = Clock::now();
