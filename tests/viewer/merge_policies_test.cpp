@@ -199,31 +199,38 @@ TEST(MergePolicies, NoNodeComesOrGoesWithAJump) {
   // moves by as little there as anywhere.
   std::vector<Vector3d> const places = {{-1, 0, 0}, {-0.2, 0.4, 0}, {0.3, -0.5, 0.2}, {1, 0.1, 0}};
   std::vector<Vector3d> const colors = {{0.6, 0, 0}, {0, 0.6, 0}, {0, 0, 0.6}, {0.5, 0.5, 0.5}};
-  std::vector<NodeMesh> nodes;
-  for (std::size_t i = 0; i < places.size(); ++i) nodes.push_back(node_at(places[i], colors[i]));
-  auto renderer = renderer_of(nodes, 1, with(MergePolicy::positional));
-  auto const last_node = [&] { return renderer.used()[2].node; };
-  auto const render = [&](double x) {
-    Vector3d const eye(x, 0, 0);
-    return renderer.render(square_camera(24, 16), look_at(eye, eye - Vector3d::UnitZ()));
-  };
-  int switches = 0;
-  for (double x = -0.9; x < 0.9; x += 0.05) {
-    render(x);
-    std::size_t const before = last_node();
-    render(x + 0.05);
-    if (last_node() == before) continue;
-    double low = x, high = x + 0.05;
-    while (high - low > 1e-9) {
-      double const middle = (low + high) / 2;
-      render(middle);
-      (last_node() == before ? low : high) = middle;
+  for (bool const has_steps : {false, true}) {
+    std::vector<NodeMesh> nodes;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      // With a box before the wall each node hides and shows other parts of it.
+      Surface const walls = room(kHalf, plain(colors[i]));
+      Surface const scene = together({walls, solid_box({-0.3, -1, -1.2}, {0.3, 1, -1}, plain(kRed))});
+      nodes.push_back(mesh_of(capture_cube(has_steps ? scene : walls, places[i], 64)));
     }
-    cv::Mat4b const a = render(low).color.clone(), b = render(high).color;
-    EXPECT_LE(cv::norm(a, b, cv::NORM_INF), 1) << "at " << low;
-    ++switches;
+    auto renderer = renderer_of(nodes, 1, with(MergePolicy::positional));
+    auto const last_node = [&] { return renderer.used()[2].node; };
+    auto const render = [&](double x) {
+      Vector3d const eye(x, 0, 0.2);
+      return renderer.render(square_camera(96, 48), look_at(eye, eye - Vector3d::UnitZ()));
+    };
+    int switches = 0;
+    for (double x = -0.9; x < 0.9; x += 0.05) {
+      render(x);
+      std::size_t const before = last_node();
+      render(x + 0.05);
+      if (last_node() == before) continue;
+      double low = x, high = x + 0.05;
+      while (high - low > 1e-9) {
+        double const middle = (low + high) / 2;
+        render(middle);
+        (last_node() == before ? low : high) = middle;
+      }
+      cv::Mat4b const a = render(low).color.clone(), b = render(high).color;
+      EXPECT_LE(cv::norm(a, b, cv::NORM_INF), 1) << "at " << low << (has_steps ? " with steps" : "");
+      ++switches;
+    }
+    EXPECT_GE(switches, 2);
   }
-  EXPECT_GE(switches, 2);
 }
 
 TEST(MergePolicies, FillingChangesOnlyGaps) {

@@ -17,8 +17,11 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// What a merged node counts at least, that it shows where it is alone.
-constexpr double kLeastWeight = 1e-4;
+/// What a merged node counts at least, that it shows where it is alone; so little that elsewhere not even (q / q')⁴
+/// times as much lifts black by a level.
+constexpr double kLeastWeight = 1e-7;
+/// From which weight on it hides others as any does: below, as a node that comes must not change what is seen at once.
+constexpr float kWeightThatHides = 0.05F;
 
 /// Pixels where nothing was drawn, and the rectangle that holds them.
 struct Gaps {
@@ -157,7 +160,7 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
     ComposedLayer compose;
     compose.texture = &nodes[i].node->texture();
     compose.weight = options_.policy == MergePolicy::positional ? float(nodes[i].weight) : 1.0F;
-    compose.fill_rank = 1;
+    compose.fill_rank = std::min(1.0F, compose.weight / kWeightThatHides);
     compose.feather = options_.silhouettes == WalkthroughOptions::Silhouettes::fade;
     composed.push_back(compose);
   }
