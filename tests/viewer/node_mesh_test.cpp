@@ -41,7 +41,7 @@ TEST(NodeMesh, QualityOfATriangleIsTheCosineOfItsWall) {
     double const cosine = p.cwiseAbs().maxCoeff() / p.norm();
     // Vertices off by the parallax's share of a depth tilt a small triangle: here planes are exact to rounding, 2^-24
     // of the coordinates over edges of at least half a pixel, 1/32 of them.
-    EXPECT_NEAR(mesh.quality[t], cosine, 2 * 32 * std::ldexp(4.0, -24) + 1e-5) << p.transpose();
+    EXPECT_NEAR(mesh.quality[t], cosine, 2 * 32 * std::ldexp(4.0, -24)) << p.transpose();
   }
   for (float const q : mesh.smooth_quality()) {
     EXPECT_GT(q, 1 / std::sqrt(3.0) - 1e-3);  // at the room's corners
