@@ -18,8 +18,11 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// What a merged node counts at least, that it shows where it is alone.
-constexpr double kLeastWeight = 1e-4;
+/// What a merged node counts at least, that it shows where it is alone; so little that elsewhere not even (q / q')⁴
+/// times as much lifts black by a level.
+constexpr double kLeastWeight = 1e-7;
+/// From which weight on it hides others as any does: below, as a node that comes must not change what is seen at once.
+constexpr float kWeightThatHides = 0.05F;
 
 /// Pixels where nothing was drawn, and the rectangle that holds them.
 struct Gaps {
@@ -57,6 +60,14 @@ ComposedLayer composed_layer(RasterNode const& node, std::size_t index) {
   Eigen::Vector3f const hue = view_hue(index);
   std::copy_n(hue.data(), 3, layer.hue);
   return layer;
+}
+
+/// The parts of a picture that the rasteriser draws at once.
+template <typename Do>
+void for_each_block(Camera const& camera, Do const& act) {
+  for (int y = 0; y < camera.height(); y += kBlock)
+    for (int x = 0; x < camera.width(); x += kBlock)
+      act(cv::Rect(x, y, std::min(kBlock, camera.width() - x), std::min(kBlock, camera.height() - y)));
 }
 
 void require(bool holds, char const* what) {
@@ -173,6 +184,7 @@ void WalkthroughRenderer::draw(std::vector<Drawn> const& nodes, Camera const& ca
     layers.push_back(std::move(layer));
     ComposedLayer compose = composed_layer(*nodes[i].node, nodes[i].index);
     if (options_.policy == MergePolicy::positional) compose.weight = float(nodes[i].weight);
+    compose.fill_rank = std::min(1.0F, compose.weight / kWeightThatHides);
     compose.feather = options_.silhouettes == WalkthroughOptions::Silhouettes::fade;
     composed.push_back(compose);
   }
@@ -195,16 +207,26 @@ bool WalkthroughRenderer::fill(Drawn const& node, UsedNode& used, Camera const& 
   if (what == RasterNode::What::surfaces) used.sides = layer.parts.size();
   for (LayerRasterizer::Part const& part : layer.parts) used.triangles += part.mesh->labels.size();
   if (layer.parts.empty()) return true;
+  for_each_block(narrowed, [&](cv::Rect const& block) {
+    cv::Rect const area = block + gaps.area.tl();
+    fill_gaps(node, narrowed.cropped(block.x, block.y, block.width, block.height), scene_from_camera, frame.color(area),
+              frame.depth(area), what);
+  });
+  return true;
+}
+
+void WalkthroughRenderer::fill_gaps(Drawn const& node, Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
+                                    cv::Mat4b color, cv::Mat1f depth, RasterNode::What what) {
+  LayerRasterizer::Layer layer = node.node->layer(camera, scene_from_camera, what);
+  if (layer.parts.empty()) return;
   layer.wireframe = options_.show == WalkthroughOptions::Show::triangles;
   ComposedLayer const compose = composed_layer(*node.node, node.index);
   SoftZ soft_z;
   soft_z.nearest = true;
   soft_z.show = shown_by(options_);
   Composition const how = composition(soft_z, camera);
-  Frame patch = new_frame(narrowed.width(), narrowed.height());
-  cv::Mat4b color = frame.color(gaps.area);
-  cv::Mat1f depth = frame.depth(gaps.area);
-  rasterizer_.draw({layer}, narrowed.width(), narrowed.height(), [&](LayerRasterizer::Tile& tile) {
+  Frame patch = new_frame(camera.width(), camera.height());
+  rasterizer_.draw({layer}, camera.width(), camera.height(), [&](LayerRasterizer::Tile& tile) {
     constexpr std::size_t kMask = 2;  // measured_layers() uses the others
     float* const open = tile.scratch(kMask);
     std::fill_n(open, LayerRasterizer::kTilePixels, 0.0F);
@@ -229,7 +251,6 @@ bool WalkthroughRenderer::fill(Drawn const& node, UsedNode& used, Camera const& 
         depth(y, x) = patch.depth(y, x);
       }
   });
-  return true;
 }
 
 Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const& scene_from_camera) {
@@ -263,12 +284,10 @@ Frame WalkthroughRenderer::render(Camera const& camera, Eigen::Isometry3d const&
       last_.color.size() != cv::Size(camera.width(), camera.height()))
     last_ = new_frame(camera.width(), camera.height());
   Frame frame = last_;
-  for (int y = 0; y < camera.height(); y += kBlock)
-    for (int x = 0; x < camera.width(); x += kBlock) {
-      cv::Rect const block(x, y, std::min(kBlock, camera.width() - x), std::min(kBlock, camera.height() - y));
-      draw(merged, camera.cropped(x, y, block.width, block.height), scene_from_camera, frame.color(block),
-           frame.depth(block));
-    }
+  for_each_block(camera, [&](cv::Rect const& block) {
+    draw(merged, camera.cropped(block.x, block.y, block.width, block.height), scene_from_camera, frame.color(block),
+         frame.depth(block));
+  });
   stages_ = {{"merge", milliseconds_since(start)}};
 
   auto const filling = Clock::now();

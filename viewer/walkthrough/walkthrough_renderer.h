@@ -62,6 +62,8 @@ class WalkthroughRenderer final : public Renderer {
             cv::Mat4b color, cv::Mat1f depth);
   bool fill(Drawn const& node, UsedNode& used, Camera const& camera, Eigen::Isometry3d const& scene_from_camera,
             Frame& frame, RasterNode::What what);
+  void fill_gaps(Drawn const& node, Camera const& camera, Eigen::Isometry3d const& scene_from_camera, cv::Mat4b color,
+                 cv::Mat1f depth, RasterNode::What what);
 
   std::shared_ptr<NodeLibrary> library_;
   WalkthroughOptions options_;
