@@ -273,10 +273,21 @@ class NodeMesher {
     return false;
   }
 
+  double least_linear_depth() const {
+    double farthest = 0;
+    for (Work const& work : work_)
+      for (int y = 0; y < work.image.depth.rows; ++y)
+        for (int x = 0; x < work.image.depth.cols; ++x)
+          if (work.image.has_depth(x, y)) farthest = std::max(farthest, double(work.image.depth(y, x)));
+    return farthest > 0 ? 1 / farthest : 0;
+  }
+
   NodeMesh assemble() {
     NodeMesh result;
     result.position = node_.position;
     std::map<std::pair<std::array<long, 3>, double>, int> held;
+    // Within tolerance of infinitely far is also what lies beyond it, behind the eye.
+    double const least = least_linear_depth();
     for (std::size_t s = 0; s < work_.size(); ++s) {
       Work const& work = work_[s];
       DepthTriangulation const& m = work.side.triangulation;
@@ -296,7 +307,7 @@ class NodeMesher {
           auto const key = seam_key(side.camera, side.node_from_camera, vertex.position);
           index[v] = held.try_emplace({key, vertex.depth}, next).first->second;
         }
-        if (index[v] == next) result.vertices.push_back((ray / vertex.depth).cast<float>());
+        if (index[v] == next) result.vertices.push_back((ray / std::max(vertex.depth, least)).cast<float>());
         return index[v];
       };
       for (int t = 0; t < int(m.triangles().size()); ++t) {
