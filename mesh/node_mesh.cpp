@@ -12,13 +12,13 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "base/srgb.h"
 #include "mesh/depth_fit.h"
 #include "mesh/feather.h"
 #include "mesh/greedy_insertion.h"
 #include "mesh/hole_fill.h"
 #include "mesh/joint_fit.h"
 #include "mesh/node_gutter.h"
+#include "mesh/node_paint.h"
 #include "mesh/node_panes.h"
 #include "mesh/node_seams.h"
 #include "mesh/outline.h"
@@ -338,16 +338,7 @@ class NodeMesher {
     ViewMesh covered;
     covered.camera = side.camera;
     covered.feather = work.feather;
-    side.color = padded_texture(work.image, covered);
-    if (gain != Vector3d::Ones()) {
-      cv::Mat3b table(1, 256);
-      for (int i = 0; i < 256; ++i)
-        for (int c = 0; c < 3; ++c) {
-          double const linear = std::min(gain[2 - c] * linear_from_srgb8()[std::size_t(i)], 1.0);
-          table(0, i)[c] = cv::saturate_cast<uchar>(255 * srgb_from_linear(linear));
-        }
-      cv::LUT(side.color, table, side.color);
-    }
+    side.color = with_gain(padded_texture(work.image, covered), gain);
     side.feather = covered.feather;
   }
 

@@ -3,8 +3,11 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "viewer/evaluate/fused_mesh.h"
 #include "viewer/evaluate/lumigraph_renderer.h"
+#include "viewer/walkthrough/view_node.h"
+#include "viewer/walkthrough/walkthrough_renderer.h"
 
 namespace scanview {
 namespace {
@@ -49,6 +52,48 @@ class NearestView final : public HeldOutRenderer {
   std::unique_ptr<ViewBasedRenderer> renderer_;
 };
 
+/// Every view a node of one side.
+class Walkthrough final : public HeldOutRenderer {
+ public:
+  Walkthrough(ViewLibrary& library, double threshold, int threads) {
+    std::vector<NodeMesh> nodes;
+    std::vector<double> depths;
+    std::size_t const count = library.meshes().size();
+    node_of_view_.assign(count, -1);
+    for (std::size_t v = 0; v < count; ++v) {
+      cv::Mat3b const picture = library.picture(v);
+      if (library.meshes()[v].mesh.triangles.empty() || picture.empty()) continue;
+      node_of_view_[v] = int(nodes.size());
+      nodes.push_back(view_node(library.set().views[v], library.meshes()[v], picture));
+      for (auto const& vertex : nodes.back().vertices) depths.push_back(double(vertex.norm()));
+    }
+    WalkthroughOptions options;
+    options.filling = int(count);
+    // What views may differ by is a length, the same at all depths: about the median one.
+    options.depth_tolerance = threshold / median(depths);
+    options.parallax_tolerance_px = 0;
+    renderer_ = std::make_unique<WalkthroughRenderer>(make_node_library(nodes, median(depths)), options, threads);
+  }
+  void exclude(std::vector<std::size_t> const& views) override {
+    std::vector<std::size_t> nodes;
+    for (std::size_t const view : views)
+      if (node_of_view_[view] >= 0) nodes.push_back(std::size_t(node_of_view_[view]));
+    renderer_->exclude(std::move(nodes));
+  }
+  Frame render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) override {
+    return renderer_->render(camera, object_from_camera);
+  }
+
+ private:
+  std::vector<int> node_of_view_;  ///< −1: none
+  std::unique_ptr<WalkthroughRenderer> renderer_;
+};
+
+bool has_orthographic_views(ScanSet const& set) {
+  return std::any_of(set.views.begin(), set.views.end(),
+                     [](View const& view) { return !view.image.camera.is_perspective(); });
+}
+
 }  // namespace
 
 std::vector<Contender> make_contenders(ScanSet const& set, std::shared_ptr<ViewLibrary> library,
@@ -66,6 +111,11 @@ std::vector<Contender> make_contenders(ScanSet const& set, std::shared_ptr<ViewL
   LumigraphOptions lumigraph;
   lumigraph.threshold = options.threshold;
   all.push_back({"lumigraph", "unstructured lumigraph (k = 4)", make_lumigraph_renderer(library, lumigraph)});
+  if (!has_orthographic_views(set)) {
+    double const threshold = options.threshold >= 0 ? options.threshold : default_threshold(*library);
+    all.push_back({"walkthrough", "walkthrough, each view a node",
+                   std::make_unique<Walkthrough>(*library, threshold, context.threads)});
+  }
   if (auto fused = make_fused_mesh_renderer(set)) {
     all.push_back({"fused_mesh", "fused mesh, vertex colours (Open3D)", std::move(fused)});
   }
