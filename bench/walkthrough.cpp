@@ -28,10 +28,11 @@ Vector3d const kUp = Vector3d::UnitY();
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-/// The paper's triangulation: random probes of Voronoi edges, triangles across steps left out, depths as sampled.
-NodeMeshOptions as_the_paper(NodeMeshOptions options) {
+/// The paper's triangulation: random probes of Voronoi edges, triangles across steps left out or kept, depths as
+/// sampled.
+NodeMeshOptions as_the_paper(NodeMeshOptions options, NodeMeshOptions::Silhouettes silhouettes) {
   options.placement = NodeMeshOptions::Placement::probing;
-  options.silhouettes = NodeMeshOptions::Silhouettes::torn;
+  options.silhouettes = silhouettes;
   options.fit = NodeMeshOptions::Fit::none;
   return options;
 }
@@ -150,7 +151,9 @@ void experiment(ModelCamera& camera, std::size_t frames, std::vector<ReportSecti
     NodeMeshOptions inserted = mesh;
     inserted.fit = NodeMeshOptions::Fit::none;
     add("insertion, no fit", "#2277cc", inserted, draw, false);
-    add("the paper's", "#999999", as_the_paper(mesh), paper_draw, false);
+    add("the paper's, torn", "#999999", as_the_paper(mesh, NodeMeshOptions::Silhouettes::torn), paper_draw, false);
+    add("the paper's, with skins", "#cc7722", as_the_paper(mesh, NodeMeshOptions::Silhouettes::skins), paper_draw,
+        false);
     Compared const needed = compared(captured, mesh, draw, references, all, context);
     print("ours, within 0.25 px", needed);
     PlotOptions options, by_frame;

@@ -198,8 +198,10 @@ void add_building_options(CLI::App* part, WalkthroughArguments& arguments) {
   part->add_option("--placement", mesh.placement, "Of vertices: insertion, probing (the paper's)")
       ->transform(CLI::CheckedTransformer(kPlacements));
   static std::map<std::string, NodeMeshOptions::Silhouettes> const kSteps = {
-      {"constrained", NodeMeshOptions::Silhouettes::constrained}, {"torn", NodeMeshOptions::Silhouettes::torn}};
-  part->add_option("--steps", mesh.silhouettes, "Depth steps: constrained, torn (the paper's)")
+      {"constrained", NodeMeshOptions::Silhouettes::constrained},
+      {"torn", NodeMeshOptions::Silhouettes::torn},
+      {"skins", NodeMeshOptions::Silhouettes::skins}};
+  part->add_option("--steps", mesh.silhouettes, "Depth steps: constrained, torn or skins (the paper's)")
       ->transform(CLI::CheckedTransformer(kSteps));
   static std::map<std::string, NodeMeshOptions::Fit> const kFits = {{"none", NodeMeshOptions::Fit::none},
                                                                     {"depths", NodeMeshOptions::Fit::depths},

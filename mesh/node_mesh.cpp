@@ -108,7 +108,7 @@ class NodeMesher {
     work.side.camera = work.image.camera;
     work.side.node_from_camera = sides_[s].object_from_camera->linear();
     work.side.links = work.steps;
-    if (options_.silhouettes == NodeMeshOptions::Silhouettes::torn) link_everything(work.side.links);
+    if (options_.silhouettes != NodeMeshOptions::Silhouettes::constrained) link_everything(work.side.links);
     find_tolerances(work);
     work.side.triangulation =
         triangulate_outline(work.image, work.side.links, trace_outline(work.side.links), work.tolerance);
@@ -267,7 +267,7 @@ class NodeMesher {
   }
 
   bool is_torn(Work const& work, DepthTriangle const& shape) const {
-    if (options_.silhouettes == NodeMeshOptions::Silhouettes::constrained) return false;
+    if (options_.silhouettes != NodeMeshOptions::Silhouettes::torn) return false;
     for (int i = 0; i < 3; ++i)
       if (crosses_step(work.steps, shape.corner[i], shape.corner[(i + 1) % 3])) return true;
     return false;

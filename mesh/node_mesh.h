@@ -49,9 +49,9 @@ struct NodeMeshOptions {
   double walking_radius = 1;  ///< scene units
   /// MeshOptions::Placement without the grid.
   enum class Placement { insertion, probing } placement = Placement::insertion;
-  /// constrained: depth steps are edges of the triangulation. torn: the paper's; triangles cross them, and those that
-  /// do are left out.
-  enum class Silhouettes { constrained, torn } silhouettes = Silhouettes::constrained;
+  /// constrained: depth steps are edges of the triangulation. torn, skins: the paper's; triangles cross them, and those
+  /// that do are left out, or stay as skins in which colours are interpolated across the gap (figure 15).
+  enum class Silhouettes { constrained, torn, skins } silhouettes = Silhouettes::constrained;
   enum class Fit { none, depths, joint } fit = Fit::joint;  ///< MeshOptions::Fit
   double step_sigmas = 6;                                   ///< MeshOptions::step_sigmas
   int min_patch_pixels = 1;                                 ///< MeshOptions::min_patch_pixels
