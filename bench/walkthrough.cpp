@@ -170,7 +170,7 @@ void experiment(ModelCamera& camera, std::size_t frames, std::vector<ReportSecti
 void over_nodes(ModelCamera& camera, std::vector<ReportSection>& sections, Context& context) {
   std::vector<CapturedNode> all;
   for (int i = 0; i < 6; ++i) {
-    Vector3d const at = kPairs[0].from + (i % 3) * Vector3d(1.4, 0, -0.3) + (i / 3) * Vector3d(0.2, 0, -1.9);
+    Vector3d const at = kPairs[0].from + (i % 3) * Vector3d(1.4, 0, -0.3) + (i / 3) * Vector3d(-0.9, 0, -2.4);
     all.push_back(capture_node(camera, at, 512, fmt::format("{}", i), context));
   }
   Pair const line{all[0].position + Vector3d(0.5, 0, -0.3), all[5].position + Vector3d(-0.4, 0, 0.5)};
