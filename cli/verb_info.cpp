@@ -14,6 +14,7 @@
 #include "base/ply.h"
 #include "cli/session.h"
 #include "mesh/triangle_mesh.h"
+#include "viewer/walkthrough/walkthrough_file.h"
 
 namespace scanview {
 namespace fs = std::filesystem;
@@ -157,10 +158,26 @@ Json info_archive(fs::path const& path) {
   return {{"kind", "archive"}, {"import", guess_import_kind(path)}, {"files", names}};
 }
 
+Json info_walkthrough(fs::path const& folder) {
+  WalkthroughManifest const manifest = read_walkthrough(folder);
+  Json nodes = Json::array();
+  for (auto const& node : manifest.nodes)
+    nodes.push_back({{"name", node.name},
+                     {"position", {node.position.x(), node.position.y(), node.position.z()}},
+                     {"triangles", node.triangles},
+                     {"parallax_px", node.parallax_px},
+                     {"levels", node.levels.size()}});
+  return {{"kind", "walkthrough"},
+          {"unit", to_string(manifest.unit)},
+          {"walking_radius", manifest.walking_radius},
+          {"nodes", nodes}};
+}
+
 Json info(fs::path const& path, Context& context) {
   if (!fs::exists(path)) throw Error(ErrorCode::bad_input, path, "does not exist");
   if (fs::is_directory(path)) {
     if (fs::exists(path / "scanset.json")) return info_scan_set(path, context);
+    if (is_walkthrough(path)) return info_walkthrough(path);
     if (is_capture(path)) return info_capture(path / "capture.json");
     if (fs::exists(path / "rgbd.json")) return info_rgbd(path / "rgbd.json");
     std::string const kind = guess_import_kind(path);
