@@ -61,7 +61,8 @@ class DepthFit {
         if (unknown[i] < 0) continue;
         right[unknown[i]] += equations.right[i];
         for (int j = 0; j < 3; ++j)
-          if (unknown[j] >= 0 && unknown[i] >= unknown[j]) entries.emplace_back(unknown[i], unknown[j], equations.matrix(i, j));
+          if (unknown[j] >= 0 && unknown[i] >= unknown[j])
+            entries.emplace_back(unknown[i], unknown[j], equations.matrix(i, j));
       }
     }
     for (int u = 0; u < unknowns; ++u) entries.emplace_back(u, u, pixels[u] > 0 ? kHeld * weights[u] / pixels[u] : 1.0);

@@ -21,7 +21,7 @@ class DepthTriangulation {
     double depth = 0;          ///< linear
     bool on_border = false;
     bool is_held = false;  ///< no fit changes its depth: another picture's mesh has the same vertex
-    int triangle = -1;  ///< one around it; −1: removed
+    int triangle = -1;     ///< one around it; −1: removed
   };
   struct Triangle {
     std::array<int, 3> vertex;  ///< from x to y; −1: removed
