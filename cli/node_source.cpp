@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "acquire/json_vector.h"
 #include "acquire/panorama.h"
 #include "acquire/scan_set_file.h"
 #include "base/error.h"
@@ -179,10 +180,7 @@ std::vector<Eigen::Vector3d> read_node_positions(fs::path const& file) {
     std::string const where = fmt::format("nodes[{}]", positions.size());
     if (entry.is_object()) refuse_unknown_keys(entry, {"name", "position"}, where, file);
     Json const& place = entry.is_object() ? json_member(entry, "position", file) : entry;
-    if (!place.is_array() || place.size() != 3) bad(where + ": must be three numbers");
-    Eigen::Vector3d position;
-    for (int i = 0; i < 3; ++i) position[i] = json_finite(place[std::size_t(i)], where, file);
-    positions.push_back(position);
+    positions.push_back(vector_from_json(place, where, file));
   }
   return positions;
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "acquire/json_vector.h"
 #include "base/error.h"
 #include "base/files.h"
 #include "base/image_file.h"
@@ -19,15 +20,6 @@ constexpr int kFormat = 1;
 constexpr int kMostSides = 1000, kMostTriangles = 1 << 28;
 
 [[noreturn]] void bad(fs::path const& path, std::string const& what) { throw Error(ErrorCode::bad_input, path, what); }
-
-Json vector_to_json(Eigen::Vector3d const& v) { return Json::array({v.x(), v.y(), v.z()}); }
-
-Eigen::Vector3d vector_from_json(Json const& json, std::string const& key, fs::path const& path) {
-  if (!json.is_array() || json.size() != 3) bad(path, key + ": must be three numbers");
-  Eigen::Vector3d v;
-  for (int i = 0; i < 3; ++i) v[i] = json_finite(json[i], key, path);
-  return v;
-}
 
 Eigen::Matrix3d rotation_from_json(Json const& json, std::string const& key, fs::path const& path) {
   if (!json.is_array() || json.size() != 9) bad(path, key + ": must be nine numbers, row by row");

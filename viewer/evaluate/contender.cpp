@@ -68,7 +68,8 @@ class Walkthrough final : public HeldOutRenderer {
       for (auto const& vertex : nodes.back().vertices) depths.push_back(double(vertex.norm()));
     }
     WalkthroughOptions options;
-    options.filling = int(count);
+    constexpr int kMost = 8;  // an object is surrounded by gaps that nothing fills
+    options.filling = std::min(int(count), kMost);
     // What views may differ by is a length, the same at all depths: about the median one.
     options.depth_tolerance = threshold / median(depths);
     options.parallax_tolerance_px = 0;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "acquire/json_vector.h"
 #include "base/error.h"
 #include "base/json_fields.h"
 
@@ -15,15 +16,6 @@ char const* const kFile = "walkthrough.json";
 
 [[noreturn]] void bad(fs::path const& path, std::string const& what) { throw Error(ErrorCode::bad_input, path, what); }
 
-Json to_json(Eigen::Vector3d const& v) { return Json::array({v.x(), v.y(), v.z()}); }
-
-Eigen::Vector3d vector_from(Json const& json, std::string const& key, fs::path const& path) {
-  if (!json.is_array() || json.size() != 3) bad(path, key + ": must be three numbers");
-  Eigen::Vector3d v;
-  for (int i = 0; i < 3; ++i) v[i] = json_finite(json[i], key, path);
-  return v;
-}
-
 double positive(Json const& json, char const* key, fs::path const& path) {
   double const value = json_finite(json_member(json, key, path), key, path);
   if (!(value > 0)) bad(path, fmt::format("{}: must be greater than 0", key));
@@ -34,7 +26,7 @@ WalkthroughManifest::Node node_from(Json const& json, std::string const& where, 
   refuse_unknown_keys(json, {"name", "position", "triangles", "parallax_px", "levels"}, where, path);
   WalkthroughManifest::Node node;
   node.name = json_text(json_member(json, "name", path), where + ".name", path);
-  node.position = vector_from(json_member(json, "position", path), where + ".position", path);
+  node.position = vector_from_json(json_member(json, "position", path), where + ".position", path);
   node.triangles =
       std::size_t(json_integer(json_member(json, "triangles", path), where + ".triangles", 0, kMostTriangles, path));
   node.parallax_px = json_finite(json_member(json, "parallax_px", path), where + ".parallax_px", path);
@@ -66,14 +58,14 @@ WalkthroughManifest read_walkthrough(fs::path const& folder) {
   manifest.unit = unit_from_string(json_text(json_member(json, "unit", path), "unit", path), path);
   manifest.walking_radius = positive(json, "walking_radius", path);
   manifest.focal_length = positive(json, "focal_length", path);
-  manifest.up = vector_from(json_member(json, "up", path), "up", path);
+  manifest.up = vector_from_json(json_member(json, "up", path), "up", path);
   if (!(manifest.up.norm() > 0)) bad(path, "up: must be a direction");
   manifest.up.normalize();
   if (json.contains("walk")) {
     Json const& walk = json["walk"];
     refuse_unknown_keys(walk, {"low", "high"}, "walk", path);
-    manifest.walk = Eigen::AlignedBox3d(vector_from(json_member(walk, "low", path), "walk.low", path),
-                                        vector_from(json_member(walk, "high", path), "walk.high", path));
+    manifest.walk = Eigen::AlignedBox3d(vector_from_json(json_member(walk, "low", path), "walk.low", path),
+                                        vector_from_json(json_member(walk, "high", path), "walk.high", path));
     if (manifest.walk->isEmpty()) bad(path, "walk: low must not be above high");
   }
   Json const& nodes = json_member(json, "nodes", path);
@@ -89,12 +81,13 @@ void write_walkthrough(fs::path const& folder, WalkthroughManifest const& manife
   json["unit"] = to_string(manifest.unit);
   json["walking_radius"] = manifest.walking_radius;
   json["focal_length"] = manifest.focal_length;
-  json["up"] = to_json(manifest.up);
-  if (manifest.walk) json["walk"] = {{"low", to_json(manifest.walk->min())}, {"high", to_json(manifest.walk->max())}};
+  json["up"] = vector_to_json(manifest.up);
+  if (manifest.walk)
+    json["walk"] = {{"low", vector_to_json(manifest.walk->min())}, {"high", vector_to_json(manifest.walk->max())}};
   json["nodes"] = Json::array();
   for (WalkthroughManifest::Node const& node : manifest.nodes)
     json["nodes"].push_back({{"name", node.name},
-                             {"position", to_json(node.position)},
+                             {"position", vector_to_json(node.position)},
                              {"triangles", node.triangles},
                              {"parallax_px", node.parallax_px},
                              {"levels", node.levels}});
