@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "acquire/scan_set_file.h"
