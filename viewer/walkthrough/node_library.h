@@ -24,7 +24,7 @@ class NodeLibrary {
   virtual std::vector<Eigen::Vector3d> const& positions() const = 0;
   /// How far an eye may be from a node that its triangles were made for.
   virtual double walking_radius() const = 0;
-  /// Pixels across 90 degrees of the nodes' pictures, the median: what a pixel of parallax is.
+  /// Of the nodes' pictures, in pixels, the median: with the walking radius it says what a pixel of parallax is.
   virtual double focal_length() const = 0;
   /// A node to be drawn for an eye at this distance, in the detail that such an eye needs. Null where it failed, or,
   /// unless `wait` is `Wait::yes`, is still being read.

@@ -21,7 +21,8 @@ enum class VisibilityGaps { background, interpolated };
 struct WalkthroughOptions {
   MergePolicy policy = MergePolicy::positional;
   /// Nodes that are merged: those nearest to the eye. Node i of n weighs 1/dᵢ − 1/dₙ₊₁, dₙ₊₁ the distance of the next
-  /// node: with two nodes and no third the paper's t, and no node comes or goes with a jump.
+  /// node: with two nodes and no third the paper's t, and no node comes or goes with a jump (positional; the other
+  /// policies do not weigh, and jump).
   int merged = 3;
   /// Further nodes, the nearest first, that are drawn only where nothing is yet (§8: a mask, and the frustum narrowed
   /// to the gaps), as long as there are gaps.

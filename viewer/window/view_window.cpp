@@ -144,11 +144,11 @@ class ViewWindow final : public WindowLoop {
     switch (command) {
       case Command::add_keyframe:
         keyframes_.add(control_.current());
-        save_keyframes();
+        save(keyframes_);
         return;
       case Command::remove_keyframe:
         keyframes_.remove_last();
-        save_keyframes();
+        save(keyframes_);
         return;
       case Command::look:
         enter(WindowMode::look);
@@ -186,16 +186,6 @@ class ViewWindow final : public WindowLoop {
     Frame const frame = viewed_.renderer().render(fit_camera(control_.current().camera, width, height),
                                                   control_.current().object_from_camera);
     return frame.color;
-  }
-
-  void save_keyframes() {
-    if (keyframes_.size() == 0) return;
-    try {
-      keyframes_.save(options_.pictures);
-      say(fmt::format("{} keyframes in {}", keyframes_.size(), keyframes_.file().string()));
-    } catch (Error const& error) {
-      say(error.what());
-    }
   }
 
   void warn_of_failures() {
@@ -304,7 +294,7 @@ class ViewWindow final : public WindowLoop {
     }
     if (content_.frames_between != before.frames_between) {
       keyframes_.between = content_.frames_between;
-      save_keyframes();
+      save(keyframes_);
     }
     if (answer.jump) jump(*answer.jump);
     for (Command const command : answer.commands) obey(command);

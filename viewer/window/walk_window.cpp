@@ -148,7 +148,7 @@ class WalkWindow final : public WindowLoop {
     if (content_.look != before) use_look();
     if (content_.frames_between != between) {
       keyframes_.between = content_.frames_between;
-      save_keyframes();
+      save(keyframes_);
     }
     if (answer.jump) jump(*answer.jump);
     for (Command const command : answer.commands) obey(command);
@@ -250,25 +250,14 @@ class WalkWindow final : public WindowLoop {
       case Command::add_keyframe:
         if (viewport_.width < 1) return;  // before the first picture
         keyframes_.add({camera(viewport_.width, viewport_.height), control_.scene_from_camera(), ""});
-        save_keyframes();
+        save(keyframes_);
         return;
       case Command::remove_keyframe:
         keyframes_.remove_last();
-        save_keyframes();
+        save(keyframes_);
         return;
       default:
         return;
-    }
-  }
-
-  void save_keyframes() {
-    if (keyframes_.size() == 0) return;
-    // A full disk must not end the session.
-    try {
-      keyframes_.save(options_.pictures);
-      say(fmt::format("{} keyframes in {}", keyframes_.size(), keyframes_.file().string()));
-    } catch (Error const& error) {
-      say(error.what());
     }
   }
 

@@ -1,5 +1,7 @@
 #include "viewer/window/window_loop.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 #include <vector>
@@ -80,6 +82,16 @@ std::optional<FrameTimes> WindowLoop::measure() {
   }
   if (all.empty()) return std::nullopt;
   return FrameTimes{viewport_.width, viewport_.height, median(frame), median(panel), 1 / median(all)};
+}
+
+void WindowLoop::save(Keyframes& keyframes) {
+  if (keyframes.size() == 0) return;
+  try {
+    keyframes.save(options_.pictures);
+    say(fmt::format("{} keyframes in {}", keyframes.size(), keyframes.file().string()));
+  } catch (Error const& error) {
+    say(error.what());
+  }
 }
 
 void WindowLoop::say(std::string const& message) {

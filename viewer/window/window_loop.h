@@ -10,6 +10,7 @@
 #include "viewer/window/frame_presenter.h"
 #include "viewer/window/glfw_window.h"
 #include "viewer/window/held_keys.h"
+#include "viewer/window/keyframes.h"
 #include "viewer/window/orbit_control.h"
 #include "viewer/window/panel_frame.h"
 #include "viewer/window/pointer_gestures.h"
@@ -64,6 +65,9 @@ class WindowLoop {
 
   /// Shows a message until something is done.
   void say(std::string const& message);
+  /// Writes them beside the pictures, where there are any, and says where, or why not: a full disk must not end the
+  /// session.
+  void save(Keyframes& keyframes);
   /// The panel has something new to show.
   void refresh() { panel_frames_ = kSettle; }
   /// The eye has moved.
