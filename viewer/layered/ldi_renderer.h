@@ -1,0 +1,74 @@
+#pragma once
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/context.h"
+#include "viewer/layered/ldi_traversal.h"
+#include "viewer/layered/splat_canvas.h"
+#include "viewer/renderer.h"
+
+namespace scanview {
+
+struct LdiRenderOptions {
+  /// TraversalOptions: greater is faster and more blurred.
+  double stamp_px = 1;
+  /// What is drawn where no pixel of the traversed cells is: nothing; or filtered pixels of the cells above them, the
+  /// finest first (Chang 1998, §3.5).
+  enum class Gaps { background, filled } gaps = Gaps::filled;
+  /// Pixels that are covered less are gaps, 0 to 1.
+  double covered = 0.5;
+
+  void validate() const;  ///< Throws Error{usage} naming the field and its range.
+};
+
+/// Draws an LDI tree (Chang, Bishop, Lastra 1998, §3.2 to 3.5) on the processor's cores. The picture does not depend on
+/// the number of threads. Some 20 million splats a second and core.
+class LdiRenderer : public Renderer {
+ public:
+  LdiRenderer(std::shared_ptr<LdiTree const> tree, LdiRenderOptions const& options, int threads = 0);
+
+  Frame render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) override;
+
+  /// A picture in steps (§3.4): begin(), then refine() until it says that nothing is left. The first step draws cells
+  /// whose steps are kFirstPx pixels on the screen, each following one those of half as many; what has been drawn for
+  /// good is not drawn again. picture() at any time.
+  void begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera);
+  bool refine();
+  Frame picture();
+  /// As many steps as fit into so many milliseconds, judged by the steps before; at least the first.
+  Frame render_within(double milliseconds, Camera const& camera, Eigen::Isometry3d const& object_from_camera);
+  static constexpr double kFirstPx = 8;
+
+  // Of the last picture:
+  std::vector<TraversedCell> const& traversed() const { return traversed_; }
+  std::size_t splats() const { return splats_; }
+  /// Pixels that nothing covered before gaps were filled, and after.
+  std::size_t gaps() const { return gaps_; }
+  std::size_t uncovered() const { return uncovered_; }
+  bool is_complete() const { return postponed_.empty(); }
+  std::map<std::string, double> const& stages() const { return stages_; }  ///< milliseconds
+
+  LdiTree const& tree() const { return *tree_; }
+  LdiRenderOptions options;
+
+ private:
+  void draw(std::vector<TraversedCell> const& cells);
+  void fill_gaps(Frame& frame);
+  std::size_t count_gaps(Frame const& frame, cv::Mat1b& stencil) const;
+
+  std::shared_ptr<LdiTree const> tree_;
+  Context context_;
+  Camera camera_;
+  Eigen::Isometry3d object_from_camera_;
+  /// What is drawn for good, and the filtered pixels of cells that were postponed.
+  SplatCanvas lasting_, passing_, filling_;
+  bool has_passing_ = false;
+  double until_px_ = 0;
+  std::vector<TraversedCell> traversed_, postponed_;
+  std::size_t splats_ = 0, gaps_ = 0, uncovered_ = 0;
+  std::map<std::string, double> stages_;
+};
+
+}  // namespace scanview

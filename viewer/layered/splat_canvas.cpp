@@ -1,0 +1,246 @@
+#include "viewer/layered/splat_canvas.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+
+#include "base/parallel.h"
+#include "viewer/layered/ldi_traversal.h"
+#include "viewer/raster/encode_table.h"
+
+namespace scanview {
+namespace {
+
+constexpr float kWidest = 48;  // pixels that a splat reaches: what is nearer is out of focus anyway
+
+std::uint32_t encoded(float linear) {
+  float const root = std::sqrt(std::clamp(linear, 0.0F, 1.0F));
+  return encode_table()[static_cast<std::size_t>(root * kEncodeSteps + 0.5F)];
+}
+
+}  // namespace
+
+/// A cell as the camera sees it.
+struct SplatCanvas::DrawnCell {
+  SplatTransform transforms[kLdiFaces];
+  LdiPixels pixels;
+};
+
+struct SplatCanvas::DrawnBlock {
+  std::uint32_t cell, first;
+  std::uint16_t count;
+  std::uint8_t face;
+  int left, right, top, bottom;  // pixels that it may reach
+};
+
+void SplatCanvas::begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera) {
+  camera_ = camera;
+  camera_from_object_ = object_from_camera.inverse();
+  std::size_t const size = static_cast<std::size_t>(camera.width()) * static_cast<std::size_t>(camera.height());
+  if (size > capacity_) {
+    for (auto& layer : layers_) layer = std::make_unique_for_overwrite<OutputLayer[]>(size);
+    capacity_ = size;
+  }
+  counts_.resize(size);
+  touched_.assign(bands(), {});
+}
+
+OutputArea SplatCanvas::area(std::size_t band, cv::Mat1b const& stencil) const {
+  int const top = static_cast<int>(band) * kBand;
+  std::size_t const first = static_cast<std::size_t>(top) * static_cast<std::size_t>(camera_.width());
+  OutputArea area;
+  for (int k = 0; k < kOutputLayers; ++k) area.layers[k] = layers_[k].get() + first;
+  area.counts = const_cast<std::uint8_t*>(counts_.data()) + first;
+  area.stencil = stencil.empty() ? nullptr : stencil.ptr(top);
+  area.stride = camera_.width();
+  area.left = 0;
+  area.right = camera_.width();
+  area.top = top;
+  area.bottom = std::min(top + kBand, camera_.height());
+  return area;
+}
+
+namespace {
+
+/// From grid steps of a face to the screen: rows u, v (times z where perspective) and z.
+SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, Camera const& camera,
+                            Eigen::Isometry3d const& camera_from_object, double near) {
+  int const axis = face / 2, n = tree.options.resolution;
+  double const step = ldi_step(cell.key.level);
+  Eigen::Matrix<double, 3, 4> placed;
+  placed.col(0) = step * camera_from_object.linear().col((axis + 1) % 3);
+  placed.col(1) = step * camera_from_object.linear().col((axis + 2) % 3);
+  placed.col(2) = step * camera_from_object.linear().col(axis);
+  placed.col(3) = camera_from_object * ldi_corner(cell.key, n);
+  Eigen::Matrix<double, 3, 4> rows;
+  bool const perspective = camera.is_perspective();
+  rows.row(0) = camera.fx() * placed.row(0);
+  rows.row(1) = camera.fy() * placed.row(1);
+  rows.row(2) = placed.row(2);
+  if (perspective) {
+    rows.row(0) += camera.cx() * placed.row(2);
+    rows.row(1) += camera.cy() * placed.row(2);
+  } else {
+    rows(0, 3) += camera.cx();
+    rows(1, 3) += camera.cy();
+  }
+  SplatTransform transform;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 4; ++k) transform.rows[i][k] = static_cast<float>(rows(i, k));
+  transform.depth_scale = float(n) / 65536;
+  // The grid's axes and the face's own make a right-handed frame: on the screen (y down) it turns the positive way
+  // where the axis points away from the camera.
+  bool const oriented = tree.options.normals == LdiOptions::Normals::measured;
+  transform.facing = !oriented ? 0 : face % 2 == 0 ? 1 : -1;
+  transform.tolerance = static_cast<float>(tree.merge_distance(cell.key.level));
+  transform.near = static_cast<float>(near);
+  transform.widest = kWidest;
+  transform.perspective = perspective;
+  return transform;
+}
+
+}  // namespace
+
+std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& parts, cv::Mat1b const& stencil,
+                              Context& context) {
+  double const near = nearest_drawn(tree);
+  std::vector<DrawnCell> cells(parts.size());
+  std::vector<std::vector<DrawnBlock>> blocks_of(parts.size());
+  int const width = camera_.width(), height = camera_.height();
+  constexpr std::size_t kGrain = 16;
+  for_each_index(context, (parts.size() + kGrain - 1) / kGrain, [&](std::size_t grain) {
+    for (std::size_t p = grain * kGrain; p < std::min(parts.size(), (grain + 1) * kGrain); ++p) {
+      LdiCell const& cell = tree.cells[static_cast<std::size_t>(parts[p].cell)];
+      std::size_t const first = parts[p].which == CellPart::Which::filtered ? cell.unfiltered_blocks : 0;
+      std::size_t const last = parts[p].which == CellPart::Which::unfiltered ? cell.unfiltered_blocks : cell.blocks;
+      if (first >= last) continue;
+      DrawnCell& drawn = cells[p];
+      auto const blocks = tree.blocks(cell);
+      drawn.pixels = tree.pixels(cell);
+      unsigned known = 0;
+      for (std::size_t k = first; k < last; ++k) {
+        LdiBlock const& block = blocks[k];
+        int const face = block.face;
+        if ((known & 1U << face) == 0) {
+          drawn.transforms[face] = transform_of(tree, cell, face, camera_, camera_from_object_, near);
+          known |= 1U << face;
+        }
+        SplatTransform const& t = drawn.transforms[face];
+        float least_u = 1e30F, most_u = -1e30F, least_v = 1e30F, most_v = -1e30F, least_z = 1e30F, most_z = -1e30F;
+        for (int corner = 0; corner < 8; ++corner) {
+          float const x = corner & 1 ? float(block.high[0]) + 1.0F : float(block.low[0]),
+                      y = corner & 2 ? float(block.high[1]) + 1.0F : float(block.low[1]),
+                      z = corner & 4 ? float(block.high[2]) + 1.0F : float(block.low[2]);
+          auto const at = [&](int row) {
+            return t.rows[row][0] * x + t.rows[row][1] * y + t.rows[row][2] * z + t.rows[row][3];
+          };
+          float const depth = at(2);
+          float const per_z = t.perspective ? 1 / std::max(depth, t.near) : 1;
+          float const u = at(0) * per_z, v = at(1) * per_z;
+          least_u = std::min(least_u, u), most_u = std::max(most_u, u);
+          least_v = std::min(least_v, v), most_v = std::max(most_v, v);
+          least_z = std::min(least_z, depth), most_z = std::max(most_z, depth);
+        }
+        DrawnBlock one{static_cast<std::uint32_t>(p), block.first, block.count, block.face, 0, width, 0, height};
+        if (t.perspective && most_z <= t.near) continue;
+        if (!t.perspective || least_z > t.near) {
+          // Splats reach about as far as two grid steps, at least a pixel.
+          float const step = float(ldi_step(cell.key.level)) * float(std::max(camera_.fx(), camera_.fy())) /
+                             (t.perspective ? least_z : 1.0F);
+          float const reach = std::min(t.widest, std::max(1.0F, 2 * step)) + 1;
+          auto const clamped = [](float value, int most) {
+            return static_cast<int>(std::clamp(value, 0.0F, static_cast<float>(most)));
+          };
+          one.left = clamped(std::floor(least_u - reach), width);
+          one.right = clamped(std::ceil(most_u + reach) + 1, width);
+          one.top = clamped(std::floor(least_v - reach), height);
+          one.bottom = clamped(std::ceil(most_v + reach) + 1, height);
+          if (one.left >= one.right || one.top >= one.bottom) continue;
+        }
+        blocks_of[p].push_back(one);
+      }
+    }
+  });
+  std::vector<std::vector<DrawnBlock>> of_band(bands());
+  for (auto const& list : blocks_of)
+    for (DrawnBlock const& block : list)
+      for (int b = block.top / kBand; b <= (block.bottom - 1) / kBand; ++b) {
+        std::size_t const band = static_cast<std::size_t>(b);
+        of_band[band].push_back(block);
+        if (touched_[band].right == 0)
+          std::memset(counts_.data() + band * kBand * static_cast<std::size_t>(width), 0,
+                      static_cast<std::size_t>(width) *
+                          static_cast<std::size_t>(std::min(kBand, height - static_cast<int>(band) * kBand)));
+        touched_[band].left = std::min(touched_[band].left, block.left);
+        touched_[band].right = std::max(touched_[band].right, block.right);
+      }
+  std::atomic<std::size_t> splats = 0;
+  for_each_index(context, of_band.size(), [&](std::size_t band) {
+    OutputArea const target = area(band, stencil);
+    std::size_t drawn = 0;
+    for (DrawnBlock const& block : of_band[band]) {
+      DrawnCell const& cell = cells[block.cell];
+      drawn += draw_splats(cell.pixels, block.first, block.count, cell.transforms[block.face], target);
+    }
+    splats += drawn;
+  });
+  return splats;
+}
+
+void SplatCanvas::write_row(SplatCanvas const* more, int y, int begin, int end, cv::Mat1b const& stencil,
+                            Frame& frame) const {
+  std::vector<ComposedPixel> row(static_cast<std::size_t>(end - begin));
+  std::size_t const band = static_cast<std::size_t>(y / kBand);
+  OutputArea const mine = area(band, {});
+  if (more != nullptr) {
+    OutputArea const others = more->area(band, {});
+    compose_splats(mine, &others, y, begin, end, row.data());
+  } else {
+    compose_splats(mine, nullptr, y, begin, end, row.data());
+  }
+  bool const perspective = camera_.is_perspective();
+  for (int x = begin; x < end; ++x) {
+    ComposedPixel const& pixel = row[static_cast<std::size_t>(x - begin)];
+    if (!stencil.empty() && stencil(y, x) == 0) continue;
+    std::uint32_t const alpha = static_cast<std::uint32_t>(pixel.coverage * 255 + 0.5F);
+    if (alpha == 0) continue;
+    float const per = 1 / pixel.coverage;
+    frame.color(y, x) =
+        cv::Vec4b(static_cast<uchar>(encoded(pixel.blue * per)), static_cast<uchar>(encoded(pixel.green * per)),
+                  static_cast<uchar>(encoded(pixel.red * per)), static_cast<uchar>(alpha));
+    frame.depth(y, x) = perspective ? 1 / pixel.key : -pixel.key;
+  }
+}
+
+void SplatCanvas::compose(SplatCanvas const* more, Frame& frame, Context& context) const {
+  frame.color.create(camera_.height(), camera_.width());
+  frame.depth.create(camera_.height(), camera_.width());
+  for_each_index(context, bands(), [&](std::size_t band) {
+    int const top = static_cast<int>(band) * kBand, bottom = std::min(top + kBand, camera_.height());
+    Touched touched = touched_[band];
+    SplatCanvas const* other = more != nullptr && more->touched_[band].right > 0 ? more : nullptr;
+    SplatCanvas const* first = this;
+    if (touched.right == 0 && other != nullptr) first = other, other = nullptr, touched = first->touched_[band];
+    if (other != nullptr) {
+      touched.left = std::min(touched.left, other->touched_[band].left);
+      touched.right = std::max(touched.right, other->touched_[band].right);
+    }
+    for (int y = top; y < bottom; ++y) {
+      std::memset(frame.color.ptr(y), 0, frame.color.elemSize() * static_cast<std::size_t>(frame.color.cols));
+      std::fill(frame.depth[y], frame.depth[y] + frame.depth.cols, kMissing);
+      if (touched.left < touched.right) first->write_row(other, y, touched.left, touched.right, {}, frame);
+    }
+  });
+}
+
+void SplatCanvas::compose_into(cv::Mat1b const& stencil, Frame& frame, Context& context) const {
+  for_each_index(context, bands(), [&](std::size_t band) {
+    int const top = static_cast<int>(band) * kBand, bottom = std::min(top + kBand, camera_.height());
+    Touched const touched = touched_[band];
+    for (int y = top; y < bottom && touched.left < touched.right; ++y)
+      write_row(nullptr, y, touched.left, touched.right, stencil, frame);
+  });
+}
+
+}  // namespace scanview

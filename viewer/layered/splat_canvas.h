@@ -1,0 +1,53 @@
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "base/context.h"
+#include "viewer/layered/ldi_tree.h"
+#include "viewer/layered/splat_kernels.h"
+#include "viewer/renderer.h"
+
+namespace scanview {
+
+/// Blocks of a cell that are to be drawn: all, or only those that are unfiltered, or only those that are filtered.
+struct CellPart {
+  std::int32_t cell = 0;
+  enum class Which { all, unfiltered, filtered } which = Which::all;
+};
+
+/// The layered output buffer of a picture, in bands of rows that are drawn in parallel; what a pixel becomes depends on
+/// the order of what is drawn alone.
+class SplatCanvas {
+ public:
+  /// Empty, of the camera's size.
+  void begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera);
+  /// Splats in this order; nearest first is fastest. `stencil`: where it is 0 nothing is drawn (empty: everywhere).
+  /// Returns the number of splats: one that lies in two bands counts twice.
+  std::size_t draw(LdiTree const& tree, std::vector<CellPart> const& parts, cv::Mat1b const& stencil, Context& context);
+  /// The layers composed from the front (§3.3), of this canvas and, where there is one, of another that was begun for
+  /// the same camera.
+  void compose(SplatCanvas const* more, Frame& frame, Context& context) const;
+  /// Only pixels where the stencil is not 0 are changed.
+  void compose_into(cv::Mat1b const& stencil, Frame& frame, Context& context) const;
+
+ private:
+  struct DrawnBlock;
+  struct DrawnCell;
+  static constexpr int kBand = 32;
+  std::size_t bands() const { return static_cast<std::size_t>((camera_.height() + kBand - 1) / kBand); }
+  OutputArea area(std::size_t band, cv::Mat1b const& stencil) const;
+  void write_row(SplatCanvas const* more, int y, int begin, int end, cv::Mat1b const& stencil, Frame& frame) const;
+
+  Camera camera_;
+  Eigen::Isometry3d camera_from_object_;
+  std::size_t capacity_ = 0;
+  std::unique_ptr<OutputLayer[]> layers_[kOutputLayers];
+  std::vector<std::uint8_t> counts_;
+  struct Touched {
+    int left = 1 << 30, right = 0;  ///< columns in which something may have been drawn
+  };
+  std::vector<Touched> touched_;  ///< of each band
+};
+
+}  // namespace scanview
