@@ -124,20 +124,23 @@ ImageWarp ImageWarper::warp_to(Camera const& camera, Eigen::Isometry3d const& ob
 
 /// Contiguous and ascending, about equally many depths each: a lower layer holds lower indices.
 std::vector<std::vector<ImageWarper::Piece>> ImageWarper::share(std::size_t threads) const {
-  auto const size = [&](std::size_t row) { return static_cast<std::size_t>(rows_[row].count); };
-  std::size_t total = 0, done = 0;
-  for (Reference const& reference : references_)
-    for (std::size_t row = reference.first_row; !reference.excluded && row < reference.end_row; ++row)
-      total += size(row);
-  std::vector<std::vector<Piece>> shares(threads);
+  std::vector<Piece> all;
+  std::size_t total = 1, done = 0;
   for (std::size_t i = 0; i < references_.size(); ++i) {
     Reference const& reference = references_[i];
-    for (std::size_t row = reference.first_row; !reference.excluded && row < reference.end_row; done += size(row++)) {
-      auto& pieces = shares[done * threads / total];
-      if (pieces.empty() || pieces.back().warp != i) pieces.push_back({i, row, row});
-      pieces.back().end_row = row + 1;
-    }
+    if (reference.excluded) continue;
+    all.push_back({i, reference.first_row, reference.end_row});
+    for (std::size_t row = reference.first_row; row < reference.end_row; ++row)
+      total += static_cast<std::size_t>(rows_[row].count);
   }
+  std::vector<std::vector<Piece>> shares(threads);
+  for (Piece const& piece : all)
+    for (std::size_t row = piece.first_row; row < piece.end_row; ++row) {
+      auto& pieces = shares[done * threads / total];
+      if (pieces.empty() || pieces.back().warp != piece.warp) pieces.push_back({piece.warp, row, row});
+      pieces.back().end_row = row + 1;
+      done += static_cast<std::size_t>(rows_[row].count);
+    }
   return shares;
 }
 
