@@ -60,6 +60,13 @@ void write_blocks(PatchWriter& writer, Blocks const& blocks) {
       }
 }
 
+std::vector<double> even_lines(double low, double high, int cells) {
+  std::vector<double> lines;
+  for (int i = 0; i < cells; ++i) lines.push_back(low + (high - low) * i / cells);
+  lines.push_back(high);
+  return lines;
+}
+
 void write_box(PatchWriter& writer, Vector3d const& low, Vector3d const& high, cv::Vec3b const& color) {
   Blocks box;
   for (int axis = 0; axis < 3; ++axis) box.lines[axis] = {low[axis], high[axis]};

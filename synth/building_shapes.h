@@ -24,6 +24,9 @@ struct Blocks {
 };
 void write_blocks(PatchWriter& writer, Blocks const& blocks);
 
+/// Of so many equal cells: one line more.
+std::vector<double> even_lines(double low, double high, int cells);
+
 void write_box(PatchWriter& writer, Eigen::Vector3d const& low, Eigen::Vector3d const& high, cv::Vec3b const& color);
 
 /// A part of the outline that turns about a vertical axis: straight lines through points (radius, height) that ascend

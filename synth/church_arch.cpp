@@ -18,10 +18,10 @@ using Eigen::Vector3i;
 constexpr double kHalfTurn = std::numbers::pi;
 constexpr double kStone = 0.9;  // height of one in the jambs
 
-/// Of the ways along the opening: up a jamb, around, down the other jamb.
+/// A place along the opening: up one jamb, around, down the other.
 struct Station {
-  double left = 0;   ///< of the jamb, 0 (foot) to 1; on the right jamb too
-  double angle = 0;  ///< 0 on the left jamb, half a turn on the right one
+  double jamb = 0;   ///< the share of its height, 0 to 1 (and all around)
+  double angle = 0;  ///< 0 on the first jamb, half a turn on the other
 };
 
 class ArchShape {
@@ -57,7 +57,7 @@ class ArchShape {
     return {1 - (along - jamb_ - arc_) / jamb_, kHalfTurn};
   }
   Vector2d level(Station const& at, double spring) const {
-    return {0, arch_.bottom + at.left * (spring - arch_.bottom)};
+    return {0, arch_.bottom + at.jamb * (spring - arch_.bottom)};
   }
   Vector2d outer(Station const& at) const {
     Vector2d const radial(-std::cos(at.angle), std::sin(at.angle));

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
@@ -245,13 +246,6 @@ void write_choir(PatchWriter& writer) {
 }
 
 }  // namespace
-
-std::vector<double> even_lines(double low, double high, int steps) {
-  std::vector<double> lines;
-  for (int i = 0; i < steps; ++i) lines.push_back(low + (high - low) * i / steps);
-  lines.push_back(high);
-  return lines;
-}
 
 void write_church_building(PatchWriter& writer) {
   write_floor(writer);

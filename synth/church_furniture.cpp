@@ -1,5 +1,7 @@
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "synth/building_shapes.h"

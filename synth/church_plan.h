@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
 #include "synth/patch_writer.h"
 
 namespace scanview {
@@ -17,9 +14,6 @@ inline constexpr double kVaultSpring = 9;
 inline constexpr double kEastWall = 1, kApseX = kNaveEnd + kEastWall, kApseRadius = 5.05, kApseSpring = 7;
 inline constexpr double kChoirFrom = 31.4, kChoirFloor = 0.45;
 inline constexpr double kJoint = 0.02;  ///< things reach so deep into what they stand on or hang at
-
-/// So many equal steps; both ends are lines.
-std::vector<double> even_lines(double low, double high, int steps);
 
 void write_church_building(PatchWriter& writer);   ///< church_building.cpp and church_apse.cpp
 void write_church_furniture(PatchWriter& writer);  ///< what can be carried away, and what hangs on walls

@@ -64,13 +64,6 @@ std::uint32_t pattern_color(Picture const& picture, Vector2d const& cells, int c
   return picture.colors[at % picture.colors.size()];
 }
 
-std::vector<double> even_lines(double low, double high, int cells) {
-  std::vector<double> lines;
-  for (int i = 0; i < cells; ++i) lines.push_back(low + (high - low) * i / cells);
-  lines.push_back(high);
-  return lines;
-}
-
 void write_picture(PatchWriter& writer, Picture const& picture) {
   constexpr double kFrame = 0.08, kFrameDepth = 0.05, kPanelDepth = 0.06, kMiddle = 1.65, kCell = 0.25;
   bool const across_x = picture.wall == Wall::low_x || picture.wall == Wall::high_x;
