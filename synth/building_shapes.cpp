@@ -62,6 +62,7 @@ void write_blocks(PatchWriter& writer, Blocks const& blocks) {
 
 std::vector<double> even_lines(double low, double high, int cells) {
   std::vector<double> lines;
+  lines.reserve(static_cast<std::size_t>(cells) + 1);
   for (int i = 0; i < cells; ++i) lines.push_back(low + (high - low) * i / cells);
   lines.push_back(high);
   return lines;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <vector>
 
@@ -31,6 +32,8 @@ class ArchShape {
   std::vector<double> lines() const {
     int const courses = jamb_ > 0 ? std::max(1, static_cast<int>(std::lround(jamb_ / kStone))) : 0;
     std::vector<double> result;
+    int const count = 2 * courses + arch_.stones + 1;
+    result.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < courses; ++i) result.push_back(jamb_ * i / courses);
     for (int i = 0; i < arch_.stones; ++i) result.push_back(jamb_ + arc_ * i / arch_.stones);
     for (int i = 0; i <= courses; ++i)

@@ -51,6 +51,7 @@ std::vector<ChurchReference> church_references(int count) {
   constexpr double kFocal = kSize / 2.0, kMiddle = (kSize - 1) / 2.0;
   Camera const camera = Camera::perspective(kSize, kSize, kFocal, kFocal, kMiddle, kMiddle);
   std::vector<ChurchReference> references;
+  references.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) references.push_back({camera, pose(kStands[i])});
   return references;
 }
@@ -60,6 +61,7 @@ std::vector<Eigen::Isometry3d> church_path(int count) {
     throw Error(ErrorCode::usage, {}, fmt::format("a path of {} poses through the church: must be 2 or more", count));
   constexpr double kFrom = 8.2, kTo = 27.0;
   std::vector<Eigen::Isometry3d> poses;
+  poses.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     double const at = static_cast<double>(i) / (count - 1), wave = 2 * std::numbers::pi * at;
     Stand const stand{{kFrom + at * (kTo - kFrom), 1.8 + 0.5 * (1 - std::cos(wave)), 0.35 * std::sin(wave)},
