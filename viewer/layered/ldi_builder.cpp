@@ -29,7 +29,7 @@ struct LdiBuilder::Landing {
   float slope_x, slope_y;
   float share;  ///< S / P of equations 3a and 3b where stamps are smaller than grid steps
   std::uint16_t red, green, blue;
-  std::uint8_t face;
+  std::uint8_t face;  ///< LdiSums
 };
 
 LdiBuilder::LdiBuilder(LdiOptions const& options) : options_(options) { options_.validate(); }
@@ -47,7 +47,8 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
   }
   int const b = (axis + 1) % 3, c = (axis + 2) % 3;
   Landing landing;
-  landing.face = static_cast<std::uint8_t>(2 * axis + (oriented && stamp.normal[axis] > 0 ? 1 : 0));
+  landing.face =
+      static_cast<std::uint8_t>(2 * axis + (oriented && stamp.normal[axis] > 0 ? 1 : 0) + (stamp.rim ? kLdiFaces : 0));
   landing.red = stamp.red;
   landing.green = stamp.green;
   landing.blue = stamp.blue;

@@ -38,7 +38,7 @@ LdiPixels ldi_pixels(std::byte const* content, std::size_t blocks, std::size_t p
 LdiContent::LdiContent(std::vector<Pixel> pixels, int resolution) : pixels_(pixels.size()) {
   if (pixels.empty()) return;
   auto const slab = [&](Pixel const& p) { return step_of(p.depth, resolution) >> kTile; };
-  auto const tile = [](Pixel const& p) { return std::make_tuple(p.filtered, p.face, p.y >> kTile, p.x >> kTile); };
+  auto const tile = [](Pixel const& p) { return std::make_tuple(p.kind, p.face, p.y >> kTile, p.x >> kTile); };
   std::sort(pixels.begin(), pixels.end(), [&](Pixel const& a, Pixel const& b) {
     auto const place = [&](Pixel const& p) { return std::make_tuple(slab(p), p.y, p.x, p.depth, p.color); };
     auto const tile_a = tile(a), tile_b = tile(b);
@@ -54,11 +54,11 @@ LdiContent::LdiContent(std::vector<Pixel> pixels, int resolution) : pixels_(pixe
       LdiBlock block;
       block.first = static_cast<std::uint32_t>(i);
       block.face = p.face;
-      block.filtered = p.filtered;
+      block.kind = p.kind;
       std::copy(at, at + 3, block.low);
       std::copy(at, at + 3, block.high);
       blocks.push_back(block);
-      if (!p.filtered) ++unfiltered_blocks_;
+      ++blocks_of_kind_[static_cast<std::size_t>(p.kind)];
     }
     LdiBlock& block = blocks.back();
     ++block.count;
@@ -125,8 +125,7 @@ LdiTree tree_of(std::unordered_map<LdiCellKey, LdiContent, LdiCellKeyHash>&& con
     LdiCell cell;
     cell.key = key;
     cell.pixels = static_cast<std::uint32_t>(content.count());
-    cell.blocks = static_cast<std::uint32_t>(content.blocks().size());
-    cell.unfiltered_blocks = static_cast<std::uint32_t>(content.unfiltered_blocks());
+    cell.blocks_of_kind = content.blocks_of_kind();
     tree.cells.push_back(cell);
   }
   std::sort(tree.cells.begin(), tree.cells.end(), [](LdiCell const& a, LdiCell const& b) {

@@ -13,25 +13,26 @@ class LdiContent {
  public:
   struct Pixel {
     std::uint8_t face = 0, x = 0, y = 0;
-    bool filtered = false;
+    LdiKind kind = LdiKind::unfiltered;
     std::int8_t slope_x = 0, slope_y = 0;
     std::uint16_t depth = 0;
     std::uint32_t color = 0;
   };
 
   LdiContent() = default;
-  /// Sorts pixels into blocks: those not filtered first, then by face; up to 16 x 16 grid points and LdiBlock::kMost
+  /// Sorts pixels into blocks: by kind, then by face; up to 16 x 16 grid points and LdiBlock::kMost
   /// pixels a block, layers that lie far apart in different ones.
   LdiContent(std::vector<Pixel> pixels, int resolution);
 
   std::size_t count() const { return pixels_; }
-  std::size_t unfiltered_blocks() const { return unfiltered_blocks_; }
+  std::array<std::uint32_t, kLdiKinds> const& blocks_of_kind() const { return blocks_of_kind_; }
   std::span<LdiBlock const> blocks() const;
   LdiPixels pixels() const;
   std::vector<std::byte> const& bytes() const { return bytes_; }
 
  private:
-  std::size_t pixels_ = 0, blocks_ = 0, unfiltered_blocks_ = 0;
+  std::size_t pixels_ = 0, blocks_ = 0;
+  std::array<std::uint32_t, kLdiKinds> blocks_of_kind_{};
   std::vector<std::byte> bytes_;
 };
 

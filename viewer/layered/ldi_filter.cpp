@@ -57,10 +57,10 @@ void layers_of(LdiSums const* sums, int face, int x, int y, double merge, std::v
   }
 }
 
-LdiContent::Pixel pixel_of(Layer const& layer, double cover, int face, int x, int y, bool filtered, int resolution) {
+LdiContent::Pixel pixel_of(Layer const& layer, double cover, int face, int x, int y, LdiKind kind, int resolution) {
   LdiContent::Pixel pixel;
   pixel.face = static_cast<std::uint8_t>(face);
-  pixel.filtered = filtered;
+  pixel.kind = kind;
   pixel.x = static_cast<std::uint8_t>(x);
   pixel.y = static_cast<std::uint8_t>(y);
   double const depth = std::clamp(layer.at() * 65536 / resolution, 0.0, 65535.0);
@@ -78,43 +78,117 @@ LdiContent::Pixel pixel_of(Layer const& layer, double cover, int face, int x, in
   return pixel;
 }
 
-/// Merges the layers that were splatted here with those that come from the children (Chang 1998, §3.1: "the merged
-/// pixel is also considered filtered"), unless these cover too little of the place.
-LdiContent merged(LdiSums const* own, LdiSums const* filtered, LdiOptions const& options, double merge) {
-  int const n = options.resolution;
-  std::vector<LdiContent::Pixel> pixels;
-  std::vector<Layer> here, below;
-  for (int face = 0; face < kLdiFaces; ++face) {
-    if (!(own != nullptr && own->has_face(face)) && !(filtered != nullptr && filtered->has_face(face))) continue;
-    for (int y = 0; y < n; ++y)
-      for (int x = 0; x < n; ++x) {
-        layers_of(own, face, x, y, merge, here);
-        layers_of(filtered, face, x, y, merge, below);
-        for (Layer const& layer : here) {
-          double const cover = std::min(1.0, layer.weight / kOwnFull);
-          Layer* nearest = nullptr;
-          for (Layer& other : below)
-            if (std::abs(other.at() - layer.at()) < merge &&
-                (nearest == nullptr || std::abs(other.at() - layer.at()) < std::abs(nearest->at() - layer.at())))
-              nearest = &other;
-          double const other_cover = nearest != nullptr ? std::min(1.0, nearest->weight / kFilteredFull) : 0;
-          if (nearest != nullptr && other_cover >= options.covered * cover) {
-            // What comes from below counts four times: of finer images.
-            double const share = 4 * other_cover / (4 * other_cover + cover);
-            double const weight = std::max(cover, other_cover) * kFilteredFull;
-            *nearest = nearest->scaled(share * weight) + layer.scaled((1 - share) * weight);
-          } else if (255 * cover >= kLeastCover) {
-            pixels.push_back(pixel_of(layer, cover, face, x, y, false, n));
-          }
-        }
-        for (Layer const& layer : below) {
-          double const cover = std::min(1.0, layer.weight / kFilteredFull);
-          if (255 * cover >= kLeastCover) pixels.push_back(pixel_of(layer, cover, face, x, y, true, n));
-        }
-      }
+/// The cells above one whose images see the same places, nearest first.
+using Ancestors = std::vector<LdiSums const*>;
+
+/// What becomes of the layers that were splatted to a cell and of those that come from its children.
+class Merger {
+ public:
+  Merger(LdiCellKey const& key, LdiSums const* own, LdiSums const* filtered, Ancestors const& above,
+         LdiOptions const& options)
+      : key_(key), own_(own), filtered_(filtered), above_(above), options_(options), n_(options.resolution) {}
+
+  LdiContent merge() {
+    for (int face = 0; face < kLdiFaces; ++face) {
+      if (!has(own_, face) && !has(own_, face + kLdiFaces) && !has(filtered_, face)) continue;
+      for (int y = 0; y < n_; ++y)
+        for (int x = 0; x < n_; ++x) merge_place(face, x, y);
+    }
+    return LdiContent(std::move(pixels_), n_);
   }
-  return LdiContent(std::move(pixels), n);
-}
+
+ private:
+  static bool has(LdiSums const* sums, int face) { return sums != nullptr && sums->has_face(face); }
+  double merge_steps(int level) const { return std::max(options_.merge_steps, options_.depth_error / ldi_step(level)); }
+
+  void merge_place(int face, int x, int y) {
+    double const within = merge_steps(key_.level);
+    layers_of(own_, face, x, y, within, here_);
+    layers_of(own_, face + kLdiFaces, x, y, within, rims_);
+    layers_of(filtered_, face, x, y, within, below_);
+    for (Layer const& rim : rims_)
+      if (!is_seen_better(rim, face, x, y)) take_in(rim, within);
+    for (Layer const& layer : here_) {
+      double const cover = std::min(1.0, layer.weight / kOwnFull);
+      Layer* const nearest = find(below_, layer.at(), within);
+      double const other_cover = nearest != nullptr ? std::min(1.0, nearest->weight / kFilteredFull) : 0;
+      if (nearest != nullptr && other_cover >= options_.covered * cover) {
+        // "The merged pixel is also considered filtered" (Chang 1998, §3.1). What comes from below counts four times:
+        // of finer images.
+        double const share = 4 * other_cover / (4 * other_cover + cover);
+        double const weight = std::max(cover, other_cover) * kFilteredFull;
+        *nearest = nearest->scaled(share * weight) + layer.scaled((1 - share) * weight);
+      } else if (255 * cover >= kLeastCover) {
+        LdiKind const kind = nearest != nullptr ? LdiKind::patch : LdiKind::unfiltered;
+        pixels_.push_back(pixel_of(layer, cover, face, x, y, kind, n_));
+      }
+    }
+    for (Layer const& layer : below_) {
+      double const cover = std::min(1.0, layer.weight / kFilteredFull);
+      if (255 * cover >= kLeastCover) pixels_.push_back(pixel_of(layer, cover, face, x, y, LdiKind::filtered, n_));
+    }
+  }
+
+  static Layer* find(std::vector<Layer>& layers, double at, double within) {
+    Layer* nearest = nullptr;
+    for (Layer& other : layers)
+      if (std::abs(other.at() - at) < within &&
+          (nearest == nullptr || std::abs(other.at() - at) < std::abs(nearest->at() - at)))
+        nearest = &other;
+    return nearest;
+  }
+
+  /// A rim becomes a part of the layer that it is near to, or one of its own.
+  void take_in(Layer const& rim, double within) {
+    Layer* const nearest = find(here_, rim.at(), within);
+    if (nearest == nullptr) {
+      here_.push_back(rim);
+    } else {
+      *nearest = *nearest + rim;
+    }
+  }
+
+  double cover_near(LdiSums const* sums, int face, int x, int y, double at, double within, double full) {
+    if (!has(sums, face)) return 0;
+    double cover = 0;
+    for (std::uint32_t k = sums->first(face, x, y); k != 0; k = (*sums)[k].next)
+      if (std::abs((*sums)[k].bin + 0.5 - at) < within + 0.5) cover += (*sums)[k].weight;
+    return cover / full;
+  }
+
+  /// Of the rims of surfaces, whose colours may be mixtures and which reach beyond the surface, only those count that
+  /// show what no other pixel shows: neither of this level, nor a finer one around, nor of the next two coarser levels.
+  bool is_seen_better(Layer const& rim, int face, int x, int y) {
+    constexpr double kCovered = 0.75, kNear = 0.25;
+    double const within = merge_steps(key_.level);
+    if (cover_near(own_, face, x, y, rim.at(), within, kOwnFull) >= kCovered) return true;
+    for (int j = std::max(0, y - 1); j <= std::min(n_ - 1, y + 1); ++j)
+      for (int i = std::max(0, x - 1); i <= std::min(n_ - 1, x + 1); ++i)
+        if (cover_near(filtered_, face, i, j, rim.at(), within + 1, kFilteredFull) >= kNear) return true;
+    std::size_t const axis = static_cast<std::size_t>(face / 2), b = (axis + 1) % 3, c = (axis + 2) % 3;
+    double place_x = x + 0.5, place_y = y + 0.5, depth = rim.at();
+    LdiCellKey key = key_;
+    for (LdiSums const* const above : above_) {
+      auto const up = [&](double value, std::size_t k) { return (value + double(key.index[k] & 1) * n_) / 2; };
+      place_x = up(place_x, b);
+      place_y = up(place_y, c);
+      depth = up(depth, axis);
+      key = key.parent();
+      if (cover_near(above, face, static_cast<int>(place_x), static_cast<int>(place_y), depth, merge_steps(key.level),
+                     kOwnFull) >= kCovered)
+        return true;
+    }
+    return false;
+  }
+
+  LdiCellKey key_;
+  LdiSums const *own_, *filtered_;
+  Ancestors const& above_;
+  LdiOptions const& options_;
+  int n_;
+  std::vector<LdiContent::Pixel> pixels_;
+  std::vector<Layer> here_, rims_, below_;
+};
 
 /// Children's pixels as sums of their parent: also of its neighbours' children along the border, whose kernels reach
 /// into it.
@@ -219,12 +293,20 @@ LdiTree filter_upwards(LdiSumCells const& sums, LdiOptions const& options, Conte
     std::sort(keys.begin(), keys.end());
     keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
     std::vector<LdiContent> made(keys.size());
-    double const merge = std::max(options.merge_steps, options.depth_error / ldi_step(level));
     for_each_index(context, keys.size(), [&](std::size_t i) {
-      auto const own = sums.find(keys[i]);
+      auto const find = [&](LdiCellKey const& key) {
+        auto const it = sums.find(key);
+        return it != sums.end() ? it->second.get() : nullptr;
+      };
+      Ancestors above;
+      LdiCellKey key = keys[i];
+      for (int k = 0; k < 2; ++k) {
+        key = key.parent();
+        above.push_back(find(key));
+      }
       Gatherer gatherer(keys[i], options.resolution);
       LdiSums const& filtered = gatherer.gather(contents);
-      made[i] = merged(own != sums.end() ? own->second.get() : nullptr, &filtered, options, merge);
+      made[i] = Merger(keys[i], find(keys[i]), &filtered, above, options).merge();
     });
     std::vector<LdiCellKey> parents;
     for (std::size_t i = 0; i < keys.size(); ++i) {

@@ -21,13 +21,18 @@ inline constexpr std::size_t kLdiPadding = 64;
 inline constexpr std::size_t kLdiPixelBytes = 10;
 inline constexpr int kLdiSlope = 127;
 
+/// Where pixels come from: reference images alone; images, where the cell's children cover a part of the place; the
+/// cell's children (and images there).
+enum class LdiKind : std::uint8_t { unfiltered, patch, filtered };
+inline constexpr int kLdiKinds = 3;
+
 /// LDI pixels of one face of a cell that lie together, none without pixels.
 struct LdiBlock {
   static constexpr std::uint32_t kMost = 256;
   std::uint32_t first = 0;
   std::uint16_t count = 0;
   std::uint8_t face = 0;
-  std::uint8_t filtered = 0;  ///< 1: its pixels come from the cell's children; 0: from reference images alone
+  LdiKind kind = LdiKind::unfiltered;
   /// Bounds in grid steps: grid points low .. high, depths from low to high + 1.
   std::uint8_t low[3] = {}, high[3] = {};
   std::uint8_t unused[2] = {};

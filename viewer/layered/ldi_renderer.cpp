@@ -39,17 +39,20 @@ void LdiRenderer::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
   stages_.clear();
 }
 
-/// Pixels that stay go to the lasting canvas, those that finer ones will replace to the passing one.
+/// Pixels that stay go to the lasting canvas, those that finer ones will replace to the passing one; patches last.
 void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
   std::vector<CellPart> lasting, passing;
   postponed_.clear();
   for (TraversedCell const& at : cells) {
+    lasting.push_back({at.cell, LdiKind::unfiltered});
     if (at.postponed) {
       postponed_.push_back(at);
-      passing.push_back({at.cell, CellPart::Which::filtered});
+      passing.push_back({at.cell, LdiKind::filtered});
+    } else if (!at.descended) {
+      lasting.push_back({at.cell, LdiKind::filtered});
     }
-    lasting.push_back({at.cell, at.descended || at.postponed ? CellPart::Which::unfiltered : CellPart::Which::all});
   }
+  for (TraversedCell const& at : cells) lasting.push_back({at.cell, LdiKind::patch});
   traversed_.insert(traversed_.end(), cells.begin(), cells.end());
   splats_ += lasting_.draw(*tree_, lasting, {}, context_);
   has_passing_ = !passing.empty();
@@ -140,7 +143,7 @@ void LdiRenderer::fill_gaps(Frame& frame) {
     std::stable_sort(cells.begin(), cells.end(),
                      [](TraversedCell const& a, TraversedCell const& b) { return a.distance < b.distance; });
     std::vector<CellPart> parts;
-    for (TraversedCell const& at : cells) parts.push_back({at.cell, CellPart::Which::filtered});
+    for (TraversedCell const& at : cells) parts.push_back({at.cell, LdiKind::filtered});
     filling_.begin(camera_, object_from_camera_);
     splats_ += filling_.draw(*tree_, parts, stencil, context_);
     filling_.compose_into(stencil, frame, context_);

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "viewer/layered/ldi_lattice.h"
+
 namespace scanview {
 
 /// What has been splatted to one place of a cell: sums of integers, which do not depend on the order of what is summed.
@@ -15,7 +17,8 @@ struct LdiSum {
   std::uint32_t slope_x = 0, slope_y = 0;      ///< Σ weight · (slope · 127 + 128)
 };
 
-/// The sums of one cell, in columns: one for each grid point of each face, from near to far.
+/// The sums of one cell, in columns: one for each grid point of each face, from near to far. Faces kLdiFaces and
+/// up are those of rims (Stamp::rim).
 class LdiSums {
  public:
   /// Sums of weights above this could overflow: of sixty thousand whole pictures.
@@ -37,7 +40,7 @@ class LdiSums {
 
  private:
   std::size_t resolution_;
-  std::vector<std::uint32_t> heads_[6];
+  std::vector<std::uint32_t> heads_[2 * kLdiFaces];
   std::vector<LdiSum> pool_;
 };
 

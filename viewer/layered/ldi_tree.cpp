@@ -36,7 +36,7 @@ bool LdiCell::has_children() const {
   return std::any_of(children.begin(), children.end(), [](std::int32_t child) { return child >= 0; });
 }
 
-std::uint64_t LdiTree::content_bytes(LdiCell const& cell) { return LdiLayout(cell.blocks, cell.pixels).end; }
+std::uint64_t LdiTree::content_bytes(LdiCell const& cell) { return LdiLayout(cell.blocks(), cell.pixels).end; }
 
 std::span<LdiBlock const> LdiTree::blocks(LdiCell const& cell) const {
   if (checked) {
@@ -48,11 +48,11 @@ std::span<LdiBlock const> LdiTree::blocks(LdiCell const& cell) const {
       mark.store(1, std::memory_order_relaxed);
     }
   }
-  return {static_cast<LdiBlock const*>(static_cast<void const*>(content.data() + cell.offset)), cell.blocks};
+  return {static_cast<LdiBlock const*>(static_cast<void const*>(content.data() + cell.offset)), cell.blocks()};
 }
 
 LdiPixels LdiTree::pixels(LdiCell const& cell) const {
-  return ldi_pixels(content.data() + cell.offset, cell.blocks, cell.pixels);
+  return ldi_pixels(content.data() + cell.offset, cell.blocks(), cell.pixels);
 }
 
 std::size_t LdiTree::pixel_count() const {

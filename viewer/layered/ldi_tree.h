@@ -26,9 +26,9 @@ struct LdiOptions {
   /// (Chang 1998, §3.1); and in units, what images may differ by (ErrorBudget::threshold), whichever is more.
   double merge_steps = 0.9;
   double depth_error = 0;
-  /// Where children cover less of a grid point, what was splatted there without filter stays unfiltered, and fills what
-  /// they leave open. 0 is the paper's rule: always filtered.
-  double covered = 0.95;
+  /// Where children cover less of a grid point, what was splatted there without filter is a patch: it fills what they
+  /// leave open. 0 is the paper's rule: it is merged with what is filtered.
+  double covered = 0.5;
   enum class Normals { measured, facing } normals = Normals::measured;  ///< StampOptions
 
   void validate() const;      ///< Throws Error{usage} naming the field and its range.
@@ -40,10 +40,11 @@ struct LdiOptions {
 struct LdiCell {
   LdiCellKey key;
   std::array<std::int32_t, 8> children;  ///< −1: none; child i: high half of axis k where bit k of i is set
-  std::uint32_t pixels = 0, blocks = 0;
-  std::uint32_t unfiltered_blocks = 0;  ///< these come first
-  std::uint64_t offset = 0;             ///< of its content within the tree's
-  std::uint64_t hash = 0;               ///< XXH3 of its content
+  std::uint32_t pixels = 0;
+  std::array<std::uint32_t, kLdiKinds> blocks_of_kind{};  ///< kind after kind
+  std::size_t blocks() const { return std::size_t{blocks_of_kind[0]} + blocks_of_kind[1] + blocks_of_kind[2]; }
+  std::uint64_t offset = 0;  ///< of its content within the tree's
+  std::uint64_t hash = 0;    ///< XXH3 of its content
   bool has_children() const;
 };
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "base/parallel.h"
 #include "viewer/layered/ldi_traversal.h"
@@ -12,7 +13,8 @@
 namespace scanview {
 namespace {
 
-constexpr float kWidest = 48;  // pixels that a splat reaches: what is nearer is out of focus anyway
+constexpr float kLeast = 0.6F;  // pixels that a splat reaches at least: wider is more blurred, less lets noise through
+constexpr float kWidest = 48;   // pixels that a splat reaches: what is nearer is out of focus anyway
 
 std::uint32_t encoded(float linear) {
   float const root = std::sqrt(std::clamp(linear, 0.0F, 1.0F));
@@ -95,6 +97,7 @@ SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, 
   transform.facing = !oriented ? 0 : face % 2 == 0 ? 1 : -1;
   transform.tolerance = static_cast<float>(tree.merge_distance(cell.key.level));
   transform.near = static_cast<float>(near);
+  transform.least = kLeast;
   transform.widest = kWidest;
   transform.perspective = perspective;
   return transform;
@@ -112,8 +115,10 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
   for_each_index(context, (parts.size() + kGrain - 1) / kGrain, [&](std::size_t grain) {
     for (std::size_t p = grain * kGrain; p < std::min(parts.size(), (grain + 1) * kGrain); ++p) {
       LdiCell const& cell = tree.cells[static_cast<std::size_t>(parts[p].cell)];
-      std::size_t const first = parts[p].which == CellPart::Which::filtered ? cell.unfiltered_blocks : 0;
-      std::size_t const last = parts[p].which == CellPart::Which::unfiltered ? cell.unfiltered_blocks : cell.blocks;
+      std::size_t const kind = static_cast<std::size_t>(parts[p].kind);
+      std::size_t const last =
+          std::accumulate(cell.blocks_of_kind.begin(), cell.blocks_of_kind.begin() + kind + 1, std::size_t{0});
+      std::size_t const first = last - cell.blocks_of_kind[kind];
       if (first >= last) continue;
       DrawnCell& drawn = cells[p];
       auto const blocks = tree.blocks(cell);
@@ -124,6 +129,7 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
         int const face = block.face;
         if ((known & 1U << face) == 0) {
           drawn.transforms[face] = transform_of(tree, cell, face, camera_, camera_from_object_, near);
+          drawn.transforms[face].fills = parts[p].kind == LdiKind::patch;
           known |= 1U << face;
         }
         SplatTransform const& t = drawn.transforms[face];

@@ -10,10 +10,10 @@
 
 namespace scanview {
 
-/// Blocks of a cell that are to be drawn: all, or only those that are unfiltered, or only those that are filtered.
+/// Blocks of a cell that are to be drawn. Patches only add to what covers a pixel less than once.
 struct CellPart {
   std::int32_t cell = 0;
-  enum class Which { all, unfiltered, filtered } which = Which::all;
+  LdiKind kind = LdiKind::unfiltered;
 };
 
 /// The layered output buffer of a picture, in bands of rows that are drawn in parallel; what a pixel becomes depends on

@@ -32,7 +32,7 @@ HWY_INLINE void Put(OutputLayer& layer, float weight, float key, float tolerance
   layer.heaviest = weight;
 }
 
-HWY_INLINE void AddSample(OutputArea const& area, std::size_t at, float weight, float key, float tolerance,
+HWY_INLINE void AddSample(OutputArea const& area, std::size_t at, float weight, float key, float tolerance, bool fills,
                           float const (&color)[4]) {
   int const count = area.counts[at];
   for (int k = 0; k < count; ++k) {
@@ -40,6 +40,7 @@ HWY_INLINE void AddSample(OutputArea const& area, std::size_t at, float weight, 
     float const nearer = key - layer.key;
     if (std::abs(nearer) <= std::max(tolerance, layer.tolerance)) {
       float* const sums = layer.sums;
+      if (fills) weight = std::min(weight, std::max(0.0F, 1 - sums[3]));
       for (int c = 0; c < 4; ++c) sums[c] += color[c] * weight;
       if (weight > layer.heaviest) {
         layer.heaviest = weight;
@@ -48,6 +49,7 @@ HWY_INLINE void AddSample(OutputArea const& area, std::size_t at, float weight, 
       }
       return;
     }
+    if (fills && layer.sums[3] >= 0.7F) return;
     if (nearer > 0) {
       int const last = std::min(count, kOutputLayers - 1);
       for (int j = last; j > k; --j) area.layers[j][at] = area.layers[j - 1][at];
@@ -62,7 +64,7 @@ HWY_INLINE void AddSample(OutputArea const& area, std::size_t at, float weight, 
   area.counts[at] = static_cast<std::uint8_t>(count + 1);
 }
 
-HWY_INLINE void DrawSplat(Splats const& s, std::size_t i, OutputArea const& area) {
+HWY_INLINE void DrawSplat(Splats const& s, std::size_t i, OutputArea const& area, bool fills) {
   float const u = s.u[i], v = s.v[i], reach_u = s.reach_u[i], reach_v = s.reach_v[i];
   int const left = std::max(area.left, static_cast<int>(std::ceil(u - reach_u))),
             right = std::min(area.right - 1, static_cast<int>(std::floor(u + reach_u)));
@@ -80,7 +82,7 @@ HWY_INLINE void DrawSplat(Splats const& s, std::size_t i, OutputArea const& area
       float const w = row_weight * (1 - std::abs(dx) * per_u);
       std::size_t const at = row + static_cast<std::size_t>(x - area.left);
       if (!(w > 0) || (area.stencil != nullptr && area.stencil[at] == 0)) continue;
-      AddSample(area, at, w, row_key + dx * s.key_u[i], s.tolerance[i], color);
+      AddSample(area, at, w, row_key + dx * s.key_u[i], s.tolerance[i], fills, color);
     }
   }
 }
@@ -133,8 +135,9 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
     auto const stamp = hn::Abs(area_signed);
     if (t.facing != 0) valid = hn::And(valid, hn::Gt(hn::Mul(area_signed, hn::Set(d, t.facing)), zero));
     auto const widest = hn::Set(d, t.widest);
-    auto const reach_u = hn::Min(widest, hn::Max(one, hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy)))));
-    auto const reach_v = hn::Min(widest, hn::Max(one, hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy)))));
+    auto const least = hn::Set(d, t.least);
+    auto const reach_u = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy)))));
+    auto const reach_v = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy)))));
     valid = hn::And(valid, hn::Gt(hn::Add(u, reach_u), hn::Set(d, float(area.left))));
     valid = hn::And(valid, hn::Lt(hn::Sub(u, reach_u), hn::Set(d, float(area.right - 1))));
     valid = hn::And(valid, hn::Gt(hn::Add(v, reach_v), hn::Set(d, float(area.top))));
@@ -178,7 +181,7 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
     hn::StoreMaskBits(d, valid, bytes);
     std::uint32_t bits = std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8;
     for (; bits != 0; bits &= bits - 1) {
-      DrawSplat(s, static_cast<std::size_t>(__builtin_ctz(bits)), area);
+      DrawSplat(s, static_cast<std::size_t>(__builtin_ctz(bits)), area, t.fills != 0);
       ++drawn;
     }
   }

@@ -32,12 +32,13 @@ struct OutputArea {
 /// u, v and z (orthographic).
 struct SplatTransform {
   float rows[3][4];
-  float depth_scale;  ///< steps in 1/65536 of the cell
-  float facing;       ///< ±1: only surfaces whose grid turns that way on the screen; 0: all
-  float tolerance;    ///< in units of depth
-  float near;         ///< perspective: nothing nearer is drawn
-  float widest;       ///< no splat reaches farther, in pixels
+  float depth_scale;    ///< steps in 1/65536 of the cell
+  float facing;         ///< ±1: only surfaces whose grid turns that way on the screen; 0: all
+  float tolerance;      ///< in units of depth
+  float near;           ///< perspective: nothing nearer is drawn
+  float least, widest;  ///< reach of a splat, in pixels
   int perspective;
+  int fills;  ///< a layer takes no more than what it lacks to be covered once
 };
 
 /// Draws pixels [first, first + count) of a cell. A splat is a bilinear kernel as wide as the grid is on the screen

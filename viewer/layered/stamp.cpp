@@ -114,6 +114,23 @@ void StampReader::refine(int x, int y, Gradient& gradient) const {
   gradient.v = solution[2];
 }
 
+/// Whether a neighbour is not on the tangent plane: the pixel's colour may be a mixture of two surfaces.
+bool StampReader::is_rim(int x, int y, Gradient const& gradient) const {
+  double const here = key(x, y), z = double(view_.image.depth(y, x)), sigma = double(view_.image.sigma(y, x));
+  bool const perspective = view_.image.camera.is_perspective();
+  double const noise = perspective ? sigma / (z * z) : sigma;
+  double const pixel = view_.image.camera.pixel_size(z) / (perspective ? z * z : 1);
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (x + dx < 0 || y + dy < 0 || x + dx >= keys_.cols || y + dy >= keys_.rows) continue;
+      double const slope = dx * gradient.u + dy * gradient.v;
+      // Creases bend by about the slope itself; steps are larger.
+      double const allowed = 6 * noise + 2 * pixel + std::abs(slope);
+      if (!(std::abs(key(x + dx, y + dy) - here - slope) <= allowed)) return true;
+    }
+  return false;
+}
+
 void StampReader::read_row(int y, std::vector<Stamp>& stamps) const {
   RangeImage const& image = view_.image;
   Camera const& camera = image.camera;
@@ -126,8 +143,10 @@ void StampReader::read_row(int y, std::vector<Stamp>& stamps) const {
                  step_v = perspective ? z / camera.fy() : 1 / camera.fy();
     // Of plane n · p = 1: 1/z = n · ray, so that the gradient of 1/z is (n_x / fx, n_y / fy).
     Eigen::Vector3d normal = -ray;
+    Gradient const g = gradient(x, y);
+    Stamp stamp;
+    stamp.rim = is_rim(x, y, g);
     if (measured) {
-      Gradient const g = gradient(x, y);
       if (g.known) {
         if (perspective) {
           Eigen::Vector3d n(g.u * camera.fx(), g.v * camera.fy(), 0);
@@ -151,12 +170,11 @@ void StampReader::read_row(int y, std::vector<Stamp>& stamps) const {
     double const slant = normal.dot(ray);
     Eigen::Vector3d const along_u = step_u * (Eigen::Vector3d::UnitX() - normal.x() / slant * ray),
                           along_v = step_v * (Eigen::Vector3d::UnitY() - normal.y() / slant * ray);
-    Stamp stamp;
     stamp.center = rotation_ * camera.unproject(x, y, z) + translation_;
     stamp.normal = (rotation_ * normal).cast<float>();
     stamp.along_u = (rotation_ * along_u).cast<float>();
     stamp.along_v = (rotation_ * along_v).cast<float>();
-    stamp.size = static_cast<float>(std::sqrt(step_u * step_v));
+    stamp.size = static_cast<float>(std::sqrt(step_u * step_v) / std::max(cosine, kGrazing));
     cv::Vec3b const& color = image.color(y, x);
     stamp.red = gained(color[2], gain_[0]);
     stamp.green = gained(color[1], gain_[1]);

@@ -19,7 +19,10 @@ struct Stamp {
   /// From a pixel's centre to the next one's on the tangent plane, along u and along v: |a|/δ and |b|/δ of equation 2
   /// on a surface that faces the camera, longer on an oblique one.
   Eigen::Vector3f along_u, along_v;
-  float size = 0;                              ///< geometric mean of z/fx and z/fy (spacings: orthographic)
+  /// S: the geometric mean of z/fx and z/fy (spacings: orthographic), longer by 1 / cos of the angle between normal and
+  /// ray: what an oblique surface is sampled at along its tilt.
+  float size = 0;
+  bool rim = false;  ///< a neighbour is on another surface: the colour may be a mixture of both
   std::uint16_t red = 0, green = 0, blue = 0;  ///< linear light
 };
 
@@ -49,6 +52,7 @@ class StampReader {
   };
   double key(int x, int y) const;
   Gradient gradient(int x, int y) const;
+  bool is_rim(int x, int y, Gradient const& gradient) const;
   void refine(int x, int y, Gradient& gradient) const;
 
   View const& view_;
