@@ -82,7 +82,8 @@ bool LdiRenderer::refine() {
 Frame LdiRenderer::picture() {
   double start = now();
   Frame frame;
-  lasting_.compose(has_passing_ ? &passing_ : nullptr, frame, context_);
+  gaps_ = uncovered_ =
+      lasting_.compose(has_passing_ ? &passing_ : nullptr, static_cast<float>(options.covered), frame, context_);
   stages_["compose"] += now() - start;
   start = now();
   fill_gaps(frame);
@@ -133,9 +134,9 @@ std::size_t LdiRenderer::count_gaps(Frame const& frame, cv::Mat1b& stencil) cons
 /// Two passes (§3.5): the picture is the first, its gaps the stencil. Cells above those that were drawn are taken level
 /// by level, so that a gap is filled with the finest that reaches it.
 void LdiRenderer::fill_gaps(Frame& frame) {
-  cv::Mat1b stencil;
-  gaps_ = uncovered_ = count_gaps(frame, stencil);
   if (gaps_ == 0 || options.gaps == LdiRenderOptions::Gaps::background) return;
+  cv::Mat1b stencil;
+  count_gaps(frame, stencil);
   std::map<int, std::vector<TraversedCell>> levels;
   for (TraversedCell const& at : traversed_)
     if (at.descended) levels[tree_->cells[static_cast<std::size_t>(at.cell)].key.level].push_back(at);

@@ -8,18 +8,12 @@
 
 #include "base/parallel.h"
 #include "viewer/layered/ldi_traversal.h"
-#include "viewer/raster/encode_table.h"
 
 namespace scanview {
 namespace {
 
 constexpr float kLeast = 0.6F;  // pixels that a splat reaches at least: wider is more blurred, less lets noise through
 constexpr float kWidest = 48;   // pixels that a splat reaches: what is nearer is out of focus anyway
-
-std::uint32_t encoded(float linear) {
-  float const root = std::sqrt(std::clamp(linear, 0.0F, 1.0F));
-  return encode_table()[static_cast<std::size_t>(root * kEncodeSteps + 0.5F)];
-}
 
 }  // namespace
 
@@ -39,7 +33,7 @@ struct SplatCanvas::DrawnBlock {
 void SplatCanvas::begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera) {
   camera_ = camera;
   camera_from_object_ = object_from_camera.inverse();
-  std::size_t const size = static_cast<std::size_t>(camera.width()) * static_cast<std::size_t>(camera.height());
+  std::size_t const size = stride() * static_cast<std::size_t>(camera.height());
   if (size > capacity_) {
     for (auto& layer : layers_) layer = std::make_unique_for_overwrite<OutputLayer[]>(size);
     capacity_ = size;
@@ -50,12 +44,12 @@ void SplatCanvas::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
 
 OutputArea SplatCanvas::area(std::size_t band, cv::Mat1b const& stencil) const {
   int const top = static_cast<int>(band) * kBand;
-  std::size_t const first = static_cast<std::size_t>(top) * static_cast<std::size_t>(camera_.width());
+  std::size_t const first = static_cast<std::size_t>(top) * stride() + 1;
   OutputArea area;
   for (int k = 0; k < kOutputLayers; ++k) area.layers[k] = layers_[k].get() + first;
   area.counts = const_cast<std::uint8_t*>(counts_.data()) + first;
   area.stencil = stencil.empty() ? nullptr : stencil.ptr(top);
-  area.stride = camera_.width();
+  area.stride = static_cast<int>(stride());
   area.left = 0;
   area.right = camera_.width();
   area.top = top;
@@ -174,10 +168,10 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
       for (int b = block.top / kBand; b <= (block.bottom - 1) / kBand; ++b) {
         std::size_t const band = static_cast<std::size_t>(b);
         of_band[band].push_back(block);
-        if (touched_[band].right == 0)
-          std::memset(counts_.data() + band * kBand * static_cast<std::size_t>(width), 0,
-                      static_cast<std::size_t>(width) *
-                          static_cast<std::size_t>(std::min(kBand, height - static_cast<int>(band) * kBand)));
+        if (touched_[band].right == 0) {
+          int const rows = std::min(kBand, height - b * kBand);
+          std::memset(counts_.data() + band * kBand * stride(), 0, stride() * static_cast<std::size_t>(rows));
+        }
         touched_[band].left = std::min(touched_[band].left, block.left);
         touched_[band].right = std::max(touched_[band].right, block.right);
       }
@@ -194,58 +188,50 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
   return splats;
 }
 
-void SplatCanvas::write_row(SplatCanvas const* more, int y, int begin, int end, cv::Mat1b const& stencil,
-                            Frame& frame) const {
-  std::vector<ComposedPixel> row(static_cast<std::size_t>(end - begin));
-  std::size_t const band = static_cast<std::size_t>(y / kBand);
-  OutputArea const mine = area(band, {});
-  if (more != nullptr) {
-    OutputArea const others = more->area(band, {});
-    compose_splats(mine, &others, y, begin, end, row.data());
-  } else {
-    compose_splats(mine, nullptr, y, begin, end, row.data());
-  }
-  bool const perspective = camera_.is_perspective();
-  for (int x = begin; x < end; ++x) {
-    ComposedPixel const& pixel = row[static_cast<std::size_t>(x - begin)];
-    if (!stencil.empty() && stencil(y, x) == 0) continue;
-    std::uint32_t const alpha = static_cast<std::uint32_t>(pixel.coverage * 255 + 0.5F);
-    if (alpha == 0) continue;
-    float const per = 1 / pixel.coverage;
-    frame.color(y, x) =
-        cv::Vec4b(static_cast<uchar>(encoded(pixel.blue * per)), static_cast<uchar>(encoded(pixel.green * per)),
-                  static_cast<uchar>(encoded(pixel.red * per)), static_cast<uchar>(alpha));
-    frame.depth(y, x) = perspective ? 1 / pixel.key : -pixel.key;
-  }
-}
-
-void SplatCanvas::compose(SplatCanvas const* more, Frame& frame, Context& context) const {
+std::size_t SplatCanvas::compose(SplatCanvas const* more, float covered, Frame& frame, Context& context) const {
   frame.color.create(camera_.height(), camera_.width());
   frame.depth.create(camera_.height(), camera_.width());
+  std::atomic<std::size_t> bare = 0;
   for_each_index(context, bands(), [&](std::size_t band) {
     int const top = static_cast<int>(band) * kBand, bottom = std::min(top + kBand, camera_.height());
-    Touched touched = touched_[band];
-    SplatCanvas const* other = more != nullptr && more->touched_[band].right > 0 ? more : nullptr;
     SplatCanvas const* first = this;
-    if (touched.right == 0 && other != nullptr) first = other, other = nullptr, touched = first->touched_[band];
-    if (other != nullptr) {
-      touched.left = std::min(touched.left, other->touched_[band].left);
-      touched.right = std::max(touched.right, other->touched_[band].right);
+    SplatCanvas const* second = more;
+    if (touched_[band].right == 0 && second != nullptr) std::swap(first, second);
+    if (second != nullptr && second->touched_[band].right == 0) second = nullptr;
+    Touched touched = first->touched_[band];
+    if (second != nullptr) {
+      touched.left = std::min(touched.left, second->touched_[band].left);
+      touched.right = std::max(touched.right, second->touched_[band].right);
     }
+    std::size_t count = 0;
+    OutputArea const mine = first->area(band, {});
+    OutputArea const others = second != nullptr ? second->area(band, {}) : OutputArea{};
     for (int y = top; y < bottom; ++y) {
-      std::memset(frame.color.ptr(y), 0, frame.color.elemSize() * static_cast<std::size_t>(frame.color.cols));
-      std::fill(frame.depth[y], frame.depth[y] + frame.depth.cols, kMissing);
-      if (touched.left < touched.right) first->write_row(other, y, touched.left, touched.right, {}, frame);
+      PictureRow const row{static_cast<std::uint32_t*>(static_cast<void*>(frame.color.ptr(y))), frame.depth[y]};
+      int const left = std::min(touched.left, touched.right), right = touched.right;
+      std::fill(row.color, row.color + left, 0U);
+      std::fill(row.color + right, row.color + camera_.width(), 0U);
+      std::fill(row.depth, row.depth + left, kMissing);
+      std::fill(row.depth + right, row.depth + camera_.width(), kMissing);
+      count += static_cast<std::size_t>(camera_.width() - (right - left));
+      if (left < right)
+        count += compose_splats(mine, second != nullptr ? &others : nullptr, y, left, right, camera_.is_perspective(),
+                                covered, row);
     }
+    bare += count;
   });
+  return bare;
 }
 
 void SplatCanvas::compose_into(cv::Mat1b const& stencil, Frame& frame, Context& context) const {
   for_each_index(context, bands(), [&](std::size_t band) {
     int const top = static_cast<int>(band) * kBand, bottom = std::min(top + kBand, camera_.height());
     Touched const touched = touched_[band];
-    for (int y = top; y < bottom && touched.left < touched.right; ++y)
-      write_row(nullptr, y, touched.left, touched.right, stencil, frame);
+    OutputArea const mine = area(band, stencil);
+    for (int y = top; y < bottom && touched.left < touched.right; ++y) {
+      PictureRow const row{static_cast<std::uint32_t*>(static_cast<void*>(frame.color.ptr(y))), frame.depth[y]};
+      compose_splats(mine, nullptr, y, touched.left, touched.right, camera_.is_perspective(), 0, row);
+    }
   });
 }
 

@@ -26,8 +26,8 @@ class SplatCanvas {
   /// Returns the number of splats: one that lies in two bands counts twice.
   std::size_t draw(LdiTree const& tree, std::vector<CellPart> const& parts, cv::Mat1b const& stencil, Context& context);
   /// The layers composed from the front (§3.3), of this canvas and, where there is one, of another that was begun for
-  /// the same camera.
-  void compose(SplatCanvas const* more, Frame& frame, Context& context) const;
+  /// the same camera. Returns the number of pixels that are covered less than `covered`.
+  std::size_t compose(SplatCanvas const* more, float covered, Frame& frame, Context& context) const;
   /// Only pixels where the stencil is not 0 are changed.
   void compose_into(cv::Mat1b const& stencil, Frame& frame, Context& context) const;
 
@@ -37,7 +37,8 @@ class SplatCanvas {
   static constexpr int kBand = 32;
   std::size_t bands() const { return static_cast<std::size_t>((camera_.height() + kBand - 1) / kBand); }
   OutputArea area(std::size_t band, cv::Mat1b const& stencil) const;
-  void write_row(SplatCanvas const* more, int y, int begin, int end, cv::Mat1b const& stencil, Frame& frame) const;
+  /// Pixels from row to row: one more on both sides, which kernels may write to.
+  std::size_t stride() const { return static_cast<std::size_t>(camera_.width()) + 2; }
 
   Camera camera_;
   Eigen::Isometry3d camera_from_object_;

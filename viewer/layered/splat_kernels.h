@@ -9,22 +9,23 @@
 
 namespace scanview {
 
-/// One layer of an output pixel.
-struct alignas(16) OutputLayer {
-  float sums[4];    ///< of weight · (red, green, blue) in linear light, and of weights; 1: covered once
-  float key;        ///< 1/z (perspective) or −z (orthographic) of the heaviest of its samples
+/// One layer of an output pixel: sums of what was added to it, weighted, as one vector.
+struct alignas(32) OutputLayer {
+  enum Sum { red, green, blue, weight, key, kSums = 7 };
+  /// Linear light, the weights themselves (1: covered once), and 1/z (perspective) or −z (orthographic).
+  float sums[kSums];
   float tolerance;  ///< what other keys may differ by and be the same surface
-  float heaviest;
-  float unused;
 };
+static_assert(sizeof(OutputLayer) == 32);
 inline constexpr int kOutputLayers = 4;
 
 /// A part of the layered output buffer (Chang 1998, §3.2: "we implement the output buffer as an LDI"): for each pixel
-/// up to kOutputLayers layers, near to far. Rows are `stride` pixels apart; the first is pixel (left, top).
+/// up to kOutputLayers layers, near to far. Rows are `stride` pixels apart; the first is that of pixel (left, top).
+/// Before and after each row there is a pixel that may be written to.
 struct OutputArea {
   OutputLayer* layers[kOutputLayers];
   std::uint8_t* counts;         ///< of each pixel's layers
-  std::uint8_t const* stencil;  ///< not null: only pixels where it is not 0 are drawn on
+  std::uint8_t const* stencil;  ///< not null: only pixels where it is not 0 are drawn on; rows of right − left pixels
   int stride, left, top, right, bottom;
 };
 
@@ -37,22 +38,27 @@ struct SplatTransform {
   float tolerance;      ///< in units of depth
   float near;           ///< perspective: nothing nearer is drawn
   float least, widest;  ///< reach of a splat, in pixels
-  int perspective;
-  int fills;  ///< a layer takes no more than what it lacks to be covered once
+  bool perspective;
+  bool fills;  ///< a layer takes no more than what it lacks to be covered once
 };
 
 /// Draws pixels [first, first + count) of a cell. A splat is a bilinear kernel as wide as the grid is on the screen
-/// there, at least a pixel; its depth follows its tangent plane. A sample is added to the layer whose depth is its own
-/// within the greater of their tolerances, else begins a new one; behind what is opaque it is lost. Returns the number
-/// of splats that were drawn.
+/// there; its depth follows its tangent plane. A sample is added to the layer whose depth is its own within the greater
+/// of their tolerances, else begins a new one; behind what is opaque it is lost. Returns the number of splats that were
+/// drawn.
 std::size_t draw_splats(LdiPixels const& pixels, std::size_t first, std::size_t count, SplatTransform const& transform,
                         OutputArea const& area);
 
-/// Layers of pixels [begin, end) of a row, near to far, as sums of linear light and coverage (0 to 1), and the key of
-/// the nearest that covers something. Two buffers may be composed as one (`more`, may be null).
-struct ComposedPixel {
-  float red, green, blue, coverage, key;
+/// What a row of the picture is written to; one element a pixel.
+struct PictureRow {
+  std::uint32_t* color;  ///< BGRA, straight alpha
+  float* depth;
 };
-void compose_splats(OutputArea const& area, OutputArea const* more, int y, int begin, int end, ComposedPixel* out);
+/// Composes the layers of pixels [begin, end) of row y from the front: layers that are opaque together hide the rest;
+/// depth is that of the one which shows most. Two buffers may be composed as one (`more`, may be null). Pixels without
+/// layers get color 0 and depth NaN; with the area's stencil only where it is not 0 anything is written. Returns the
+/// number of pixels whose coverage is below `covered`, of those written.
+std::size_t compose_splats(OutputArea const& area, OutputArea const* more, int y, int begin, int end, bool perspective,
+                           float covered, PictureRow const& out);
 
 }  // namespace scanview
