@@ -20,20 +20,29 @@ constexpr float kMostHalf = 32;  // pixels: bounds what a square costs
 
 struct Squares {
   alignas(64) float depth[16];
+  alignas(64) float u[16], v[16], per_reach[16];
   alignas(64) std::int32_t at[16];  ///< the first pixel
+  alignas(64) std::int32_t left[16], top[16];
   alignas(64) std::int32_t columns[16];
   alignas(64) std::int32_t rows[16];
 };
 
-HWY_INLINE void DrawThem(Squares const& squares, std::uint32_t bits, std::uint32_t const* colors,
+HWY_INLINE void DrawThem(Squares const& squares, std::uint32_t bits, std::uint32_t const* colors, float bias,
                          SquareTarget const& target) {
   for (; bits != 0; bits &= bits - 1) {
     auto const k = static_cast<std::size_t>(std::countr_zero(bits));
-    float const depth = squares.depth[k];
+    // Of squares of one surface that which is best in the pixel's middle wins.
+    float const nearest = squares.depth[k], u = squares.u[k], v = squares.v[k], per_reach = squares.per_reach[k];
+    int left = squares.left[k], y = squares.top[k];
     std::uint32_t const color = colors[k];
     std::size_t at = static_cast<std::size_t>(squares.at[k]);
-    for (std::int32_t y = squares.rows[k]; y > 0; --y, at += static_cast<std::size_t>(target.width)) {
-      for (std::size_t i = at; i < at + static_cast<std::size_t>(squares.columns[k]); ++i) {
+    for (std::int32_t rows = squares.rows[k]; rows > 0; --rows, ++y, at += static_cast<std::size_t>(target.width)) {
+      float const dy = (float(y) - v) * per_reach;
+      float const of_row = nearest + bias * dy * dy;
+      for (std::int32_t c = 0; c < squares.columns[k]; ++c) {
+        std::size_t const i = at + static_cast<std::size_t>(c);
+        float const dx = (float(left + c) - u) * per_reach;
+        float const depth = of_row + bias * dx * dx;
         if (depth > target.depth[i] || (depth == target.depth[i] && color >= target.color[i])) continue;
         target.depth[i] = depth;
         target.color[i] = color;
@@ -119,10 +128,15 @@ void DrawSquares(LdiPixels const& pixels, std::size_t first, std::size_t count, 
     hn::Store(depth, d, squares.depth);
     hn::Store(at, di, squares.at);
     hn::Store(columns, di, squares.columns);
+    hn::Store(u, d, squares.u);
+    hn::Store(v, d, squares.v);
+    hn::Store(hn::Div(one, reach), d, squares.per_reach);
+    hn::Store(left, di, squares.left);
+    hn::Store(top, di, squares.top);
     hn::Store(rows, di, squares.rows);
     std::uint8_t bytes[8] = {};
     hn::StoreMaskBits(d, drawn, bytes);
-    DrawThem(squares, std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8, pixels.color + i, target);
+    DrawThem(squares, std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8, pixels.color + i, t.bias, target);
   }
 }
 

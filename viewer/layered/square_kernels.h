@@ -16,6 +16,7 @@ struct SquareTransform {
   float eye[4];       ///< in grid steps and 1, or the direction of sight and 0
   float facing;       ///< ±1: the side along the depth axis that is to be seen; 0: both
   float half;         ///< half the side of a square, in pixels (times z: perspective); at least half a pixel is drawn
+  float bias;         ///< how much farther a square counts at its edge, in units of depth
   float near;         ///< nothing nearer is drawn
   bool perspective;
 };
