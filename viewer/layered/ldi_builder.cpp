@@ -15,6 +15,8 @@ constexpr double kFull = 256;  // weight of a grid point that is covered once (k
 /// A stamp of a surface that is seen from a grazing angle reaches no further than so many grid points.
 constexpr float kFarthest = 48;
 
+/// More than a tangent plane, of slopes up to 1, rises over that reach.
+constexpr std::int32_t kDeep = 128;
 std::int64_t floor_to_int(double value) { return static_cast<std::int64_t>(std::floor(value)); }
 
 }  // namespace
@@ -22,7 +24,10 @@ std::int64_t floor_to_int(double value) { return static_cast<std::int64_t>(std::
 /// A stamp above one cell, in grid steps from its corner along the face's axes.
 struct LdiBuilder::Landing {
   LdiCellKey cell;
-  float x, y, depth;
+  float x, y;
+  /// Depth is bin + (depth − kDeep): so that cells above each other agree to the bit on whose bin it is in.
+  std::int32_t bin;
+  float depth;
   /// From grid points to stamps: (a, b) = inverse (X − x, Y − y), in which the kernel is (1 − |a|)(1 − |b|); its reach
   /// along x and y.
   float a_x, a_y, b_x, b_y, reach_x, reach_y;
@@ -79,7 +84,10 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
   // Grid points are in the middle of steps.
   Eigen::Vector3d const at = (stamp.center - ldi_origin()) / step;
   double const x = at[b] - 0.5, y = at[c] - 0.5, depth = at[axis];
-  float const rise = std::abs(landing.slope_x) * landing.reach_x + std::abs(landing.slope_y) * landing.reach_y;
+  float rise = std::abs(landing.slope_x) * landing.reach_x + std::abs(landing.slope_y) * landing.reach_y;
+  if (rise > 0) rise += 1e-3F;  // for what is rounded
+  std::int64_t const bin = floor_to_int(depth);
+  landing.depth = std::min(static_cast<float>(depth - double(bin)), 1 - 0x1p-16F) + float(kDeep);
   auto const low = [&](double value, float reach) {
     return floor_to_int(value - double(reach)) + 1;  // the first grid point with a weight, or one before it
   };
@@ -99,7 +107,7 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
         landing.cell.index[static_cast<std::size_t>(c)] = j;
         landing.x = static_cast<float>(x - double(i * n));
         landing.y = static_cast<float>(y - double(j * n));
-        landing.depth = static_cast<float>(depth - double(z * n));
+        landing.bin = static_cast<std::int32_t>(bin - z * n);
         landings.push_back(landing);
       }
 }
@@ -126,12 +134,13 @@ bool splat(Landing const& landing, LdiSums& sums) {
           std::max(landing.share < 1 ? 1U : 0U, static_cast<std::uint32_t>(std::lround(exact)));
       if (weight == 0) continue;
       float const depth = landing.depth + landing.slope_x * dx + landing.slope_y * dy;
-      if (!(depth >= 0 && depth < float(n))) continue;
-      std::uint32_t const bin = static_cast<std::uint32_t>(depth);
+      std::int32_t const whole = static_cast<std::int32_t>(depth), in_cell = landing.bin + whole - kDeep;
+      if (in_cell < 0 || in_cell >= n) continue;
+      std::uint32_t const bin = static_cast<std::uint32_t>(in_cell);
       LdiSum& sum = sums.at(landing.face, x, y, bin);
       if (sum.weight > LdiSums::kMostWeight - weight) return false;
       sum.weight += weight;
-      sum.depth += weight * static_cast<std::uint32_t>((depth - float(bin)) * 256);
+      sum.depth += weight * static_cast<std::uint32_t>((depth - float(whole)) * 256);
       sum.red += std::uint64_t{weight} * landing.red;
       sum.green += std::uint64_t{weight} * landing.green;
       sum.blue += std::uint64_t{weight} * landing.blue;
