@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "viewer/layered/ldi_filter.h"
+#include "viewer/layered/ldi_key_order.h"
 
 namespace scanview {
 namespace {
@@ -83,6 +84,10 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
 
   // Grid points are in the middle of steps.
   Eigen::Vector3d const at = (stamp.center - ldi_origin()) / step;
+  if (!(at.cwiseAbs().maxCoeff() <= double(kLdiFarthestGridPoint)))
+    throw Error(ErrorCode::bad_input, {},
+                "pixels are too small for how far they are from the origin: move the scene there, or give a smallest "
+                "feature");
   double const x = at[b] - 0.5, y = at[c] - 0.5, depth = at[axis];
   float rise = std::abs(landing.slope_x) * landing.reach_x + std::abs(landing.slope_y) * landing.reach_y;
   if (rise > 0) rise += 1e-3F;  // for what is rounded
