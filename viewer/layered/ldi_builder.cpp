@@ -296,7 +296,12 @@ LdiTree LdiBuilder::build(Unit unit, Context& context) const {
   std::sort(tree.views.begin(), tree.views.end(), [](View const& a, View const& b) {
     auto const flat = [](View const& view) {
       Eigen::Matrix4d const m = view.object_from_camera->matrix();
-      return std::vector<double>(m.data(), m.data() + m.size());
+      Camera const& camera = view.image.camera;
+      std::vector<double> all(m.data(), m.data() + m.size());
+      all.insert(all.end(),
+                 {view.gain[0], view.gain[1], view.gain[2], double(camera.is_perspective()), double(camera.width()),
+                  double(camera.height()), camera.fx(), camera.fy(), camera.cx(), camera.cy()});
+      return all;
     };
     return a.name != b.name ? a.name < b.name : flat(a) < flat(b);
   });
