@@ -15,9 +15,9 @@ namespace {
 constexpr double kFull = 256;  // weight of a grid point that is covered once (kLdiFullWeight)
 /// A stamp of a surface that is seen from a grazing angle reaches no further than so many grid points.
 constexpr float kFarthest = 48;
-
 /// More than a tangent plane, of slopes up to 1, rises over that reach.
 constexpr std::int32_t kDeep = 128;
+
 std::int64_t floor_to_int(double value) { return static_cast<std::int64_t>(std::floor(value)); }
 
 }  // namespace

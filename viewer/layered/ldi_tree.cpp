@@ -99,8 +99,9 @@ void LdiTree::place_object() {
   std::vector<Eigen::Vector3d> points;
   std::vector<double> weights;
   double total = 0;
-  for (std::int32_t const root : roots) {
-    LdiCell const& cell = cells[static_cast<std::size_t>(root)];
+  auto const coarsest = std::find_if(cells.begin(), cells.end(), [](LdiCell const& cell) { return cell.pixels > 0; });
+  for (auto it = coarsest; it != cells.end() && it->key.level == coarsest->key.level; ++it) {
+    LdiCell const& cell = *it;
     Eigen::Vector3d const corner = ldi_corner(cell.key, options.resolution);
     double const step = ldi_step(cell.key.level);
     LdiPixels const p = pixels(cell);
