@@ -244,6 +244,12 @@ TEST(LdiBuilder, WhatIsTooFarToBePlacedIsRefused) {
   builder_of({pixel_at({1e12, -1e12, 0}, 1)});
 }
 
+TEST(LdiBuilder, WhatIsTooSmallForTheGridIsRefused) {
+  LdiOptions options = facing(64);
+  options.smallest_feature = 64;
+  EXPECT_SCANVIEW_ERROR(tree_of({pixel_at({1, 2, 3}, 0.1)}, options), ErrorCode::bad_input, "smallest feature");
+}
+
 /// Pixels of a face at the level that a step of 1 has, by grid point.
 std::map<std::tuple<double, double>, std::vector<PlacedPixel>> columns(LdiTree const& tree, int face) {
   std::map<std::tuple<double, double>, std::vector<PlacedPixel>> result;

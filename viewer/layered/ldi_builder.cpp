@@ -291,6 +291,9 @@ void LdiBuilder::resume(LdiTree const& tree, LdiSumCells&& sums) {
 LdiTree LdiBuilder::build(Unit unit, Context& context) const {
   if (cells_.empty()) throw Error(ErrorCode::bad_input, {}, "no pixel of the reference images has a depth");
   LdiTree tree = filter_upwards(cells_, options_, context);
+  if (tree.cells.empty())
+    throw Error(ErrorCode::bad_input, {},
+                "the reference images' pixels cover next to nothing of the grid: give a smaller smallest feature");
   tree.unit = unit;
   tree.views = views_;
   std::sort(tree.views.begin(), tree.views.end(), [](View const& a, View const& b) {

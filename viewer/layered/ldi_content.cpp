@@ -148,7 +148,7 @@ LdiTree tree_of(std::unordered_map<LdiCellKey, LdiContent, LdiCellKeyHash>&& con
   tree.content = {bytes->data(), size};
   tree.owner = bytes;
   link_cells(tree.cells, tree.roots);
-  tree.place_object();
+  if (!tree.cells.empty()) tree.place_object();
   return tree;
 }
 
