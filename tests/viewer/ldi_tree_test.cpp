@@ -204,6 +204,7 @@ TEST(LdiBuilder, ObliqueStampsLandOnceOnEveryGridPoint) {
     Camera const camera = Camera::orthographic(40, 40, 1.2, 1.2, 20, 20);
     LdiBuilder const builder = builder_of(
         {plane_view("a", camera, toward({30, 20, 50}, {0, 0, 0}), normal, 0, plain_paint({9, 9, 9}))}, options);
+    for (auto const& [key, sums] : builder.sums()) EXPECT_GT(sums->count(), 0U);
     std::map<std::tuple<std::int64_t, std::int64_t>, double> weights;
     for (PlacedSum const& one : sums_of(builder)) {
       EXPECT_EQ(one.face, 5);

@@ -249,6 +249,9 @@ void LdiBuilder::add_batch(std::vector<View> const& views, std::size_t begin, st
       for (std::uint32_t k = part.begin; k < part.end; ++k)
         if (!splat(part.band->landings[part.band->order[k]], *sums)) overflow = true;
   });
+  // Tangent planes reach fewer cells than the boxes about stamps.
+  for (auto const& [key, list] : parts)
+    if (auto const it = cells_.find(key); it->second->count() == 0) cells_.erase(it);
   if (overflow) throw Error(ErrorCode::bad_input, {}, "more pixels fall on one place of the tree than can be summed");
 }
 

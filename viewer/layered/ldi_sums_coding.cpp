@@ -171,6 +171,7 @@ LdiSumCells decode_sums(std::string_view bytes, int resolution, std::filesystem:
     if (!is_ldi_key(key) || (i > 0 && !in_ldi_order(last, key))) in.refuse();
     auto sums = std::make_unique<LdiSums>(resolution);
     for (int face = 0; face < kLdiFaces; ++face) decode_face(in, face, *sums);
+    if (sums->count() == 0) in.refuse();
     cells.emplace(key, std::move(sums));
     last = key;
   }
