@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <cerrno>
