@@ -1,4 +1,4 @@
-#include "synth/gallery_shapes.h"
+#include "synth/building_shapes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -40,12 +40,12 @@ void write_blocks(PatchWriter& writer, Blocks const& blocks) {
     patch.columns = static_cast<int>(columns.size()) - 1;
     patch.rows = static_cast<int>(rows.size()) - 1;
     patch.color = blocks.color(cell, axis, sign);
-    patch.point = [&](int column, int row) {
+    patch.point = [&](int column, int row) -> Vector3d {
       Vector3d point;
       point[axis] = level;
       point[u] = columns[column];
       point[v] = rows[row];
-      return point;
+      return blocks.place ? blocks.place(point) : point;
     };
     writer.add(patch);
   };
