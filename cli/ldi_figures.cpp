@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double milliseconds_since(Clock::time_point start) {
+double elapsed_milliseconds(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
@@ -67,7 +67,7 @@ BuiltLdi build_ldi(std::vector<View> const& views, Unit unit, LdiOptions const& 
   LdiBuilder builder(options);
   builder.add(views, context);
   auto tree = std::make_shared<LdiTree const>(builder.build(unit, context));
-  return {std::move(builder), std::move(tree), milliseconds_since(start) / 1e3};
+  return {std::move(builder), std::move(tree), elapsed_milliseconds(start) / 1e3};
 }
 
 Json ldi_size(LdiTree const& tree) {
@@ -111,7 +111,7 @@ LdiFigures measure_ldi(BuiltLdi const& built, std::vector<View> const& views, st
     for (int turn = 0; turn < 2; ++turn) {
       auto const start = Clock::now();
       renderer.render(from.camera, from.object_from_camera);
-      least = std::min(least, milliseconds_since(start));
+      least = std::min(least, elapsed_milliseconds(start));
     }
     return least;
   };
