@@ -158,7 +158,7 @@ void read_cells(std::span<std::byte const> table, std::uint64_t content_bytes, L
     cell.unfiltered_blocks = record.unfiltered_blocks;
     cell.hash = record.hash;
     cell.offset = offset;
-    if (!is_ldi_key(cell.key) || cell.blocks == 0 || cell.blocks > cell.pixels ||
+    if (!is_ldi_key(cell.key) || (cell.blocks == 0) != (cell.pixels == 0) || cell.blocks > cell.pixels ||
         cell.unfiltered_blocks > cell.blocks || LdiTree::content_bytes(cell) > content_bytes - offset)
       refuse(path, fmt::format("is damaged: cell {} cannot be", i));
     offset += LdiTree::content_bytes(cell);
