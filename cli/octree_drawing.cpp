@@ -52,13 +52,17 @@ std::string svg_octree(LdiTree const& tree, Eigen::Vector3d const& up) {
   Eigen::AlignedBox2d page;
   std::map<int, std::set<std::pair<std::int64_t, std::int64_t>>> columns;
   for (LdiCell const& cell : tree.cells) {
-    Eigen::AlignedBox3d const box = tree.box(cell);
-    page.extend(from.flat(box.min()));
-    page.extend(from.flat(box.max()));
+    // Cells that images went to: those above them may be much larger than the scene, and are cut.
+    if (cell.unfiltered_blocks > 0) {
+      page.extend(from.flat(tree.box(cell).min()));
+      page.extend(from.flat(tree.box(cell).max()));
+    }
     columns[cell.key.level].insert(
         {cell.key.index[std::size_t(from.axis + 2) % 3], cell.key.index[std::size_t(from.axis + 1) % 3]});
   }
-  constexpr double kRim = 2;
+  for (View const& view : tree.views)
+    if (view.image.camera.is_perspective()) page.extend(from.flat(view.eye()));
+  constexpr double kRim = 4;
   from.scale = (kDrawingWidth - 2 * kRim) / page.sizes().x();
   from.low = page.min() - Eigen::Vector2d::Constant(kRim / from.scale);
   std::string svg = fmt::format(
