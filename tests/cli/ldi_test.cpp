@@ -205,6 +205,12 @@ TEST_F(Ldi, TheChurchIsTracedAndPanoramasAndModelsAreTaken) {
       {"ldi", "build", "church:150000", "-o", in("church.ldi"), "--images", "1", "--light", "painted", "--no-sums"});
   EXPECT_EQ(church["images"], 1);
   EXPECT_EQ(church["input_bytes"], 512 * 512 * 7);
+  // Its path is traced too: frames are compared with what they should look like.
+  Json const report = run({"ldi", "report", "church:150000", "-o", in("church.html"), "--images", "2", "--light",
+                           "painted", "--frames", "2", "--size", "64x64"});
+  EXPECT_GT(report["images"][0]["psnr"], 12);
+  EXPECT_GT(report["images"][0]["psnr_common"], 15);
+  EXPECT_THAT(read_file(in("church.html")), HasSubstr("ray traced"));
   write_json(in("nodes.json"), {{"nodes", {{{"position", {4.4, 1.6, 2.4}}}}}});
   Json const room = run({"ldi", "build", "gallery:20000", "-o", in("room.ldi"), "--light", "painted", "--nodes",
                          in("nodes.json"), "--node-size", "32"});
