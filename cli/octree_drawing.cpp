@@ -52,8 +52,8 @@ std::string svg_octree(LdiTree const& tree, Eigen::Vector3d const& up) {
   Eigen::AlignedBox2d page;
   std::map<int, std::set<std::pair<std::int64_t, std::int64_t>>> columns;
   for (LdiCell const& cell : tree.cells) {
-    // Cells that images went to: those above them may be much larger than the scene, and are cut.
-    if (cell.unfiltered_blocks > 0) {
+    // Those at the top may be much larger than the scene, and are cut.
+    if (!cell.has_children()) {
       page.extend(from.flat(tree.box(cell).min()));
       page.extend(from.flat(tree.box(cell).max()));
     }

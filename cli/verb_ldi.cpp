@@ -175,8 +175,9 @@ void add_tree_options(CLI::App* part, LdiOptions& options) {
                                                                       {"facing", LdiOptions::Normals::facing}};
   part->add_option("--normals", options.normals, "Of surfaces: measured, or all facing the camera (the paper's)")
       ->transform(CLI::CheckedTransformer(kNormals));
-  part->add_option("--covered", options.covered,
-                   "Where finer cells cover less of a pixel, it stays unfiltered: 0 (the paper's) to 1");
+  part->add_option(
+      "--covered", options.covered,
+      "Where finer cells cover less of a pixel, its own images fill what these leave open: 0 (the paper's) to 1");
   part->add_option("--merge", options.merge_steps, "Depths of one surface differ by less, in grid steps: 0 to 1");
 }
 
