@@ -96,14 +96,13 @@ Json LdiFigures::to_json() const {
   return json;
 }
 
-LdiFigures measure_ldi(BuiltLdi const& built, std::vector<View> const& views, std::vector<PathCamera> const& path,
-                       std::vector<ReferenceFrame> const& references, LdiRenderOptions const& options,
-                       Context& context) {
+LdiFigures measure_ldi(std::shared_ptr<LdiTree const> const& built, std::vector<View> const& views,
+                       std::vector<PathCamera> const& path, std::vector<ReferenceFrame> const& references,
+                       LdiRenderOptions const& options, Context& context) {
   LdiFigures figures;
   figures.images = int(views.size());
-  figures.size = ldi_size(*built.tree);
-  figures.build_seconds = built.seconds;
-  LdiRenderer tree(built.tree, options, context.threads);
+  figures.size = ldi_size(*built);
+  LdiRenderer tree(built, options, context.threads);
   ImageWarper warper(views, context.threads);
   std::vector<double> warped;
   auto const faster_of_two = [](Renderer& renderer, PathCamera const& from) {

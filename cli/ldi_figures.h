@@ -43,10 +43,11 @@ struct LdiFigures {
   Json to_json() const;
 };
 
-/// Times along the path, quality against the references (where there are none: coverage along the path).
-LdiFigures measure_ldi(BuiltLdi const& built, std::vector<View> const& views, std::vector<PathCamera> const& path,
-                       std::vector<ReferenceFrame> const& references, LdiRenderOptions const& options,
-                       Context& context);
+/// Times along the path, quality against the references (where there are none: coverage along the path). The time to
+/// build is not known here.
+LdiFigures measure_ldi(std::shared_ptr<LdiTree const> const& built, std::vector<View> const& views,
+                       std::vector<PathCamera> const& path, std::vector<ReferenceFrame> const& references,
+                       LdiRenderOptions const& options, Context& context);
 
 /// On one colour, where a frame is transparent.
 cv::Mat3b on_background(cv::Mat4b const& picture, cv::Vec3b const& background);

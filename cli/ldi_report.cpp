@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "base/median.h"
@@ -161,14 +161,19 @@ LdiReport ldi_report(LdiSource& source, LdiReportOptions const& options, Context
   for (int const number : numbers) {
     context.check_cancelled();
     auto const views = source.views(number, context);
-    BuiltLdi const built = build_ldi(views, source.unit(), options.build, context);
-    all.push_back(measure_ldi(built, views, path, references, options.draw, context));
+    // The sums are several times as large as the tree, and not needed any more.
+    auto const [tree, seconds] = [&] {
+      BuiltLdi const built = build_ldi(views, source.unit(), options.build, context);
+      return std::pair(built.tree, built.seconds);
+    }();
+    all.push_back(measure_ldi(tree, views, path, references, options.draw, context));
+    all.back().build_seconds = seconds;
     report.figures["images"].push_back(all.back().to_json());
-    LdiRenderer renderer(built.tree, options.draw, context.threads);
+    LdiRenderer renderer(tree, options.draw, context.threads);
     view.draw(number, renderer, views, context.threads);
     if (drawing.empty() || number <= kDrawnImages)
       drawing = fmt::format("<h3>The octree's cells from above, of {} images (figure 7)</h3>", number) +
-                svg_octree(*built.tree, up_of(*built.tree));
+                svg_octree(*tree, up_of(*tree));
     context.progress("report", all.size(), numbers.size());
   }
   auto const table = table_of(all);
