@@ -42,6 +42,7 @@ void add_run(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);
 void add_visibility(CLI::App& app, Session& session);
 void add_walkthrough(CLI::App& app, Session& session);
+void add_ldi(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 
 /// One option of a stage that --set can reach, as "STAGE.NAME".
