@@ -17,6 +17,20 @@ void check_range(double value, double least, double most, char const* name, char
   if (!(value >= least && value <= most)) throw Error(ErrorCode::usage, {}, std::string(name) + ": must be " + range);
 }
 
+/// Whether what draws the blocks stays within the cell: the hash is no proof, as whoever makes a file can make it fit.
+bool are_sound(std::span<LdiBlock const> blocks, LdiCell const& cell, int resolution) {
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    LdiBlock const& block = blocks[i];
+    if (block.count == 0 || block.count > LdiBlock::kMost || block.first > cell.pixels ||
+        block.count > cell.pixels - block.first || block.face >= kLdiFaces ||
+        block.filtered != (i >= cell.unfiltered_blocks))
+      return false;
+    for (int k = 0; k < 3; ++k)
+      if (block.low[k] > block.high[k] || block.high[k] >= resolution) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 void LdiOptions::validate() const {
@@ -39,16 +53,20 @@ bool LdiCell::has_children() const {
 std::uint64_t LdiTree::content_bytes(LdiCell const& cell) { return LdiLayout(cell.blocks, cell.pixels).end; }
 
 std::span<LdiBlock const> LdiTree::blocks(LdiCell const& cell) const {
+  std::span<LdiBlock const> const blocks(
+      static_cast<LdiBlock const*>(static_cast<void const*>(content.data() + cell.offset)), cell.blocks);
   if (checked) {
     std::size_t const number = static_cast<std::size_t>(&cell - cells.data());
     std::atomic_ref<std::uint8_t> mark((*checked)[number]);
     if (mark.load(std::memory_order_relaxed) == 0) {
       if (XXH3_64bits(content.data() + cell.offset, content_bytes(cell)) != cell.hash)
         throw Error(ErrorCode::bad_input, path, "is damaged: a cell's pixels are not those that were written");
+      if (!are_sound(blocks, cell, options.resolution))
+        throw Error(ErrorCode::bad_input, path, "is damaged: a cell's blocks do not lie within it");
       mark.store(1, std::memory_order_relaxed);
     }
   }
-  return {static_cast<LdiBlock const*>(static_cast<void const*>(content.data() + cell.offset)), cell.blocks};
+  return blocks;
 }
 
 LdiPixels LdiTree::pixels(LdiCell const& cell) const {
