@@ -347,7 +347,7 @@ void add_synth(CLI::App& app, Session& session) {
   std::string names;
   for (auto const& name : builtin_model_names()) names += " " + name;
   verb->add_option("model", arguments->model,
-                   "A PLY or OBJ file, or a built-in model:" + names + " (gallery:N has N polygons)")
+                   "A PLY or OBJ file, or a built-in model:" + names + " (gallery:N and church:N have N polygons)")
       ->required();
   verb->add_option("-o,--output", arguments->output, "The capture (or scan set) to make")->required();
   verb->add_option("--pattern", arguments->pattern,

@@ -222,7 +222,8 @@ void add_walkthrough(CLI::App& app, Session& session) {
       session.work = [&session, arguments, work] { work(*arguments, session); };
     });
   };
-  char const* const kScene = "A model (PLY, OBJ, OFF, STL, glTF), \"gallery\", a scan set, or a folder of panoramas";
+  char const* const kScene =
+      "A model (PLY, OBJ, OFF, STL, glTF), \"gallery\", \"church\", a scan set, or a folder of panoramas";
 
   CLI::App* part = verb->add_subcommand("build", "Captures and simplifies the nodes of a scene");
   part->add_option("scene", arguments->scene, kScene)->required();

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "synth/gallery_shapes.h"
+#include "synth/building_shapes.h"
 #include "synth/paint.h"
 
 namespace scanview {
@@ -59,7 +59,7 @@ class Building {
     result.lines = {x_.lines, {-kWall, 0, 0.16, kDoorHeight, kRoomHeight, kRoomHeight + kWall}, z_.lines};
     result.is_solid = [this](Vector3i const& cell) { return is_solid(cell); };
     result.color = [this](Vector3i const& cell, int axis, int sign) {
-      return bgr_from_paint(rgb(color(cell, axis, cell + sign * Vector3i::Unit(axis))));
+      return bgr_from_paint(color(cell, axis, cell + sign * Vector3i::Unit(axis)));
     };
     return result;
   }

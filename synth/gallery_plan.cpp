@@ -6,9 +6,9 @@
 #include <numbers>
 #include <vector>
 
+#include "synth/building_shapes.h"
 #include "synth/gallery.h"
 #include "synth/gallery_building.h"
-#include "synth/gallery_shapes.h"
 #include "synth/paint.h"
 
 namespace scanview {
@@ -20,8 +20,6 @@ using Eigen::Vector3i;
 
 constexpr double kSunk = 0.02;  // things reach so deep into what they stand on or hang at
 constexpr std::uint32_t kMarble = 0xe2ddd2, kPlinth = 0xd8d3c9, kIron = 0x3c4046, kBrass = 0xb08a3e;
-
-cv::Vec3b paint(std::uint32_t hex) { return bgr_from_paint(rgb(hex)); }
 
 /// Of a colour circle, at full strength.
 cv::Vec3b hue(double turn) {
@@ -66,13 +64,6 @@ std::uint32_t pattern_color(Picture const& picture, Vector2d const& cells, int c
   return picture.colors[at % picture.colors.size()];
 }
 
-std::vector<double> even_lines(double low, double high, int cells) {
-  std::vector<double> lines;
-  for (int i = 0; i < cells; ++i) lines.push_back(low + (high - low) * i / cells);
-  lines.push_back(high);
-  return lines;
-}
-
 void write_picture(PatchWriter& writer, Picture const& picture) {
   constexpr double kFrame = 0.08, kFrameDepth = 0.05, kPanelDepth = 0.06, kMiddle = 1.65, kCell = 0.25;
   bool const across_x = picture.wall == Wall::low_x || picture.wall == Wall::high_x;
@@ -94,7 +85,7 @@ void write_picture(PatchWriter& writer, Picture const& picture) {
   high[side] = middle + half.x();
   low.y() = kMiddle - half.y();
   high.y() = kMiddle + half.y();
-  write_box(writer, low, high, paint(kBrass));
+  write_box(writer, low, high, bgr_from_paint(kBrass));
 
   Blocks panel;
   panel.lines[out] = depths(kPanelDepth);
@@ -103,14 +94,14 @@ void write_picture(PatchWriter& writer, Picture const& picture) {
   panel.is_solid = [](Vector3i const&) { return true; };
   panel.color = [&](Vector3i const& cell, int axis, int face) {
     bool const is_front = axis == out && face == static_cast<int>(sign);
-    return paint(is_front ? pattern_color(picture, cells, cell[side], cell.y()) : kIron);
+    return bgr_from_paint(is_front ? pattern_color(picture, cells, cell[side], cell.y()) : kIron);
   };
   write_blocks(writer, panel);
 }
 
 void write_column(PatchWriter& writer, Vector3d const& foot) {
   constexpr int kFlutes = 12;
-  cv::Vec3b const marble = paint(kMarble);
+  cv::Vec3b const marble = bgr_from_paint(kMarble);
   write_box(writer, foot + Vector3d(-0.42, -kSunk, -0.42), foot + Vector3d(0.42, 0.16, 0.42), marble);
   write_box(writer, foot + Vector3d(-0.42, kRoomHeight - 0.16, -0.42), foot + Vector3d(0.42, kRoomHeight + kSunk, 0.42),
             marble);
@@ -121,15 +112,17 @@ void write_column(PatchWriter& writer, Vector3d const& foot) {
 }
 
 void write_pole(PatchWriter& writer, Vector3d const& foot, double height, double radius, std::uint32_t color) {
-  write_lathe(writer, foot, {{{{0, -kSunk}, {radius, -kSunk}, {radius, height}, {0, height}}, paint(color), 0}}, 8);
+  write_lathe(writer, foot,
+              {{{{0, -kSunk}, {radius, -kSunk}, {radius, height}, {0, height}}, bgr_from_paint(color), 0}}, 8);
 }
 
 /// A sphere on a plinth of a square base.
 void write_exhibit(PatchWriter& writer, Vector3d const& foot, double plinth_height, double radius,
                    std::uint32_t color) {
   double const half = std::max(0.3, 0.7 * radius);
-  write_box(writer, foot - Vector3d(half, kSunk, half), foot + Vector3d(half, plinth_height, half), paint(kPlinth));
-  write_sphere(writer, foot + Vector3d(0, plinth_height + radius - 0.5 * kSunk, 0), radius, paint(color));
+  write_box(writer, foot - Vector3d(half, kSunk, half), foot + Vector3d(half, plinth_height, half),
+            bgr_from_paint(kPlinth));
+  write_sphere(writer, foot + Vector3d(0, plinth_height + radius - 0.5 * kSunk, 0), radius, bgr_from_paint(color));
 }
 
 /// Along x or z, `posts` of them.
@@ -138,7 +131,7 @@ void write_railing(PatchWriter& writer, Vector3d const& from, Vector3d const& to
   for (int i = 0; i < posts; ++i) write_pole(writer, from + (to - from) * i / (posts - 1), kHeight, 0.02, kIron);
   for (double const height : {0.5, kHeight})
     write_box(writer, from + Vector3d(-kHalf, height - kHalf, -kHalf), to + Vector3d(kHalf, height + kHalf, kHalf),
-              paint(kBrass));
+              bgr_from_paint(kBrass));
 }
 
 std::vector<Picture> pictures() {
@@ -177,7 +170,7 @@ void write_torus_room(PatchWriter& writer, Vector3d const& room) {
   torus.rotation = Eigen::AngleAxisd(-0.5, Vector3d::UnitY()).toRotationMatrix();
   torus.color = [&](int band) { return hue(static_cast<double>(band) / torus.bands); };
   write_torus(writer, torus);
-  write_box(writer, room + Vector3d(2.1, -kSunk, 4.1), room + Vector3d(4.3, 0.25, 5.9), paint(kPlinth));
+  write_box(writer, room + Vector3d(2.1, -kSunk, 4.1), room + Vector3d(4.3, 0.25, 5.9), bgr_from_paint(kPlinth));
 }
 
 void write_columns_room(PatchWriter& writer, Vector3d const& room) {
@@ -197,9 +190,9 @@ void write_steps_room(PatchWriter& writer, Vector3d const& room) {
   for (int step = 0; step < 4; ++step) {
     double const half = 1.5 - 0.35 * step, top = 0.3 * (step + 1);
     write_box(writer, middle + Vector3d(-half, top - 0.3 - kSunk, -half), middle + Vector3d(half, top, half),
-              paint(step % 2 == 0 ? 0xc9b79a : 0x9d8b70));
+              bgr_from_paint(step % 2 == 0 ? 0xc9b79a : 0x9d8b70));
   }
-  write_sphere(writer, middle + Vector3d(0, 1.58, 0), 0.4, paint(kBrass));
+  write_sphere(writer, middle + Vector3d(0, 1.58, 0), 0.4, bgr_from_paint(kBrass));
   for (int pole = 0; pole < 5; ++pole) {
     Vector3d const foot = room + Vector3d(6.8, 0, 4.4 + 0.7 * pole);
     write_pole(writer, foot, 2 + 0.3 * pole, 0.02, kIron);

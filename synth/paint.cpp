@@ -20,6 +20,8 @@ cv::Vec3b bgr_from_paint(Vector3f const& color) {
           cv::saturate_cast<uchar>(255 * color.x())};
 }
 
+cv::Vec3b bgr_from_paint(std::uint32_t hex) { return bgr_from_paint(rgb(hex)); }
+
 Vector3f within_albedo(Vector3f const& color) {
   constexpr float kDarkest = 0.2209f, kLightest = 0.9547f;  // sRGB of the linear 0.04 and 0.9
   return color.cwiseMax(kDarkest).cwiseMin(kLightest);

@@ -11,6 +11,7 @@ namespace scanview {
 Eigen::Vector3f rgb(std::uint32_t hex);
 /// For a TriangleMesh: 8 bits, B G R.
 cv::Vec3b bgr_from_paint(Eigen::Vector3f const& color);
+cv::Vec3b bgr_from_paint(std::uint32_t hex);
 /// Each channel brought to an albedo (linear) of 0.04 to 0.9, as cloth, paint and plants have.
 Eigen::Vector3f within_albedo(Eigen::Vector3f const& color);
 Eigen::Vector3f mix(Eigen::Vector3f const& a, Eigen::Vector3f const& b, float t);

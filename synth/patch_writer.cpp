@@ -48,4 +48,35 @@ std::vector<std::vector<double>> PatchWriter::divided(std::vector<double> const&
   return ways;
 }
 
+TriangleMesh mesh_of_about(std::size_t polygons, std::function<void(PatchWriter&)> const& write) {
+  auto const count_triangles = [&](double edge) {
+    PatchWriter writer(edge);
+    write(writer);
+    return writer.triangles();
+  };
+  auto const away = [&](std::size_t count) {
+    return std::abs(static_cast<double>(count) - static_cast<double>(polygons));
+  };
+  double fine = 1e-3, coarse = 4, best = fine;
+  std::size_t best_count = 0;
+  for (int i = 0; i < 40; ++i) {
+    double const edge = std::sqrt(fine * coarse);
+    std::size_t const count = count_triangles(edge);
+    if (best_count == 0 || away(count) < away(best_count)) {
+      best = edge;
+      best_count = count;
+    }
+    (count > polygons ? fine : coarse) = edge;
+  }
+  PatchWriter counter(best);
+  write(counter);
+  TriangleMesh mesh;
+  mesh.triangles.reserve(counter.triangles());
+  mesh.vertices.reserve(counter.vertices());
+  mesh.colors.reserve(counter.vertices());
+  PatchWriter writer(best, &mesh);
+  write(writer);
+  return mesh;
+}
+
 }  // namespace scanview

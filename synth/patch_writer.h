@@ -44,4 +44,7 @@ class PatchWriter {
   std::size_t triangles_ = 0, vertices_ = 0;
 };
 
+/// The mesh of what `write` writes, with the length of edges whose number of triangles is nearest `polygons`.
+TriangleMesh mesh_of_about(std::size_t polygons, std::function<void(PatchWriter&)> const& write);
+
 }  // namespace scanview

@@ -54,11 +54,11 @@ SynthResult synthesize(TriangleMesh const& model, SynthOptions const& options, C
 
 /// Built-in procedural models, coloured per vertex, y up: "dog", "basket" and "statuette", objects of about 100 units
 /// (mm) with concavities, thin parts and holes, finely enough for their colours to serve as texture; "gallery", rooms
-/// to walk through in metres (gallery.h), of 100 000 triangles, and "gallery:N" of about N. Throws Error{usage} for an
-/// unknown name or an N out of range.
+/// to walk through in metres (gallery.h), of 100 000 triangles, and "church", an interior in metres (church.h), of 200
+/// 000; "gallery:N" and "church:N" have about N. Throws Error{usage} for an unknown name or an N out of range.
 TriangleMesh builtin_model(std::string const& name);
 std::vector<std::string> builtin_model_names();
-/// Whether builtin_model means the name: one of builtin_model_names, or gallery:N.
+/// Whether builtin_model means the name: one of builtin_model_names, gallery:N or church:N.
 bool is_builtin_model(std::string const& name);
 
 }  // namespace scanview

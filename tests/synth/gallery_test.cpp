@@ -2,10 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-#include <limits>
-#include <map>
 #include <vector>
 
 #include "synth/gallery_building.h"
@@ -18,22 +14,6 @@ namespace scanview {
 namespace {
 
 using Eigen::Vector3d;
-using Eigen::Vector3f;
-
-/// Vertices of equal position joined.
-TriangleMesh welded(TriangleMesh const& mesh) {
-  TriangleMesh result;
-  std::map<std::array<float, 3>, int> known;
-  std::vector<int> now(mesh.vertices.size());
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    Vector3f const p = mesh.vertices[i] + Vector3f::Zero();  // no -0
-    auto const [at, is_new] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<int>(result.vertices.size()));
-    if (is_new) result.vertices.push_back(p);
-    now[i] = at->second;
-  }
-  for (auto const& t : mesh.triangles) result.triangles.emplace_back(now[t[0]], now[t[1]], now[t[2]]);
-  return result;
-}
 
 ModelCamera camera_in(std::size_t polygons, Context& context) {
   ModelCameraOptions options;

@@ -1,7 +1,9 @@
 #pragma once
+#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
+#include <vector>
 
 #include "mesh/triangle_mesh.h"
 
@@ -46,6 +48,21 @@ inline TriangleMesh make_cube() {
     mesh.triangles.emplace_back(q[0], q[2], q[3]);
   }
   return mesh;
+}
+
+/// Vertices of equal position joined.
+inline TriangleMesh welded(TriangleMesh const& mesh) {
+  TriangleMesh result;
+  std::map<std::array<float, 3>, int> known;
+  std::vector<int> now(mesh.vertices.size());
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    Eigen::Vector3f const p = mesh.vertices[i] + Eigen::Vector3f::Zero();  // no -0
+    auto const [at, is_new] = known.try_emplace({p.x(), p.y(), p.z()}, static_cast<int>(result.vertices.size()));
+    if (is_new) result.vertices.push_back(p);
+    now[i] = at->second;
+  }
+  for (auto const& t : mesh.triangles) result.triangles.emplace_back(now[t[0]], now[t[1]], now[t[2]]);
+  return result;
 }
 
 /// True where every edge is run through as often one way as the other.

@@ -1,4 +1,4 @@
-#include "synth/gallery_shapes.h"
+#include "synth/building_shapes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -40,12 +40,12 @@ void write_blocks(PatchWriter& writer, Blocks const& blocks) {
     patch.columns = static_cast<int>(columns.size()) - 1;
     patch.rows = static_cast<int>(rows.size()) - 1;
     patch.color = blocks.color(cell, axis, sign);
-    patch.point = [&](int column, int row) {
+    patch.point = [&](int column, int row) -> Vector3d {
       Vector3d point;
       point[axis] = level;
       point[u] = columns[column];
       point[v] = rows[row];
-      return point;
+      return blocks.place ? blocks.place(point) : point;
     };
     writer.add(patch);
   };
@@ -58,6 +58,14 @@ void write_blocks(PatchWriter& writer, Blocks const& blocks) {
           for (int const sign : {-1, 1})
             if (!is_solid(cell + sign * Vector3i::Unit(axis))) write_face(cell, axis, sign);
       }
+}
+
+std::vector<double> even_lines(double low, double high, int cells) {
+  std::vector<double> lines;
+  lines.reserve(static_cast<std::size_t>(cells) + 1);
+  for (int i = 0; i < cells; ++i) lines.push_back(low + (high - low) * i / cells);
+  lines.push_back(high);
+  return lines;
 }
 
 void write_box(PatchWriter& writer, Vector3d const& low, Vector3d const& high, cv::Vec3b const& color) {
