@@ -142,6 +142,9 @@ TEST(TreeEye, GoesAroundObjectsAndWalksInScenes) {
   within.walk({0.1, 0, 0, 30});
   EXPECT_NEAR((within.current().object_from_camera.translation() - first.translation()).norm(), 0.1 * scene->radius,
               0.01 * scene->radius);
+  std::size_t const nearest = *within.middle_view();
+  for (View const& view : scene->views)
+    EXPECT_LE((scene->views[nearest].eye() - scene->center).norm(), (view.eye() - scene->center).norm());
   within.reset();
   EXPECT_TRUE(within.current().object_from_camera.isApprox(start, 1e-12));
 }
@@ -411,6 +414,7 @@ TEST(ViewedTree, ADamagedCellEndsAPictureAndIsNamedOnce) {
     do viewed.render(camera, pose, {}, kOneStep);
     while (!viewed.is_complete() && ++steps < 20);
     EXPECT_TRUE(viewed.is_complete());
+    EXPECT_TRUE(viewed.has_failed());
     ASSERT_EQ(viewed.failures().size(), 1U);
     EXPECT_NE(viewed.failures()[0].find("hall.ldi"), std::string::npos);
     EXPECT_NE(viewed.failures()[0].find("damaged"), std::string::npos);
@@ -419,7 +423,7 @@ TEST(ViewedTree, ADamagedCellEndsAPictureAndIsNamedOnce) {
   EXPECT_THROW(viewed.render_at_once(camera, test::look_at(0.5 * at, at), {}), Error);
   // Where it is not seen, nothing is missing.
   viewed.render(camera, test::look_at(0.5 * at, -at), {}, 0);
-  EXPECT_TRUE(viewed.is_complete());
+  EXPECT_FALSE(viewed.has_failed());
   EXPECT_GT(viewed.figures().cells, 0U);
   EXPECT_EQ(viewed.failures().size(), 1U);
 }
@@ -438,7 +442,7 @@ TEST(TreePanel, SaysWhatThePictureIsMadeOf) {
   std::vector<std::string> const expected = {"refining, 31.3 ms", "34 cells traversed, 1.25 M splats",
                                              "gaps 1.23 %, uncovered 0.1 %", "tree: 200 cells, 5.0 MB"};
   EXPECT_EQ(tree_frame_text(content), expected);
-  content.complete = true;
+  content.progress = TreePanelContent::Progress::complete;
   EXPECT_EQ(tree_frame_text(content)[0], "complete, 31.3 ms");
 }
 

@@ -65,6 +65,7 @@ bool look_inwards(std::vector<View> const& views, Vector3d const& center, double
 
 TreeEye::TreeEye(LdiTree const& tree)
     : views_(tree.views),
+      center_(tree.center),
       radius_(tree.radius),
       start_(look_inwards(tree.views, tree.center, tree.radius) ? Mode::orbit : Mode::walk),
       mode_(start_),
@@ -116,6 +117,14 @@ std::optional<std::size_t> TreeEye::view_after(int steps) const {
   int const count = static_cast<int>(views_.size());
   int const from = view_ ? static_cast<int>(*view_) : steps > 0 ? -1 : 0;
   return static_cast<std::size_t>(((from + steps) % count + count) % count);
+}
+
+std::optional<std::size_t> TreeEye::middle_view() const {
+  if (views_.empty()) return std::nullopt;
+  auto const distance = [&](View const& view) { return (view.eye() - center_).squaredNorm(); };
+  auto const nearest = std::min_element(views_.begin(), views_.end(),
+                                        [&](View const& a, View const& b) { return distance(a) < distance(b); });
+  return static_cast<std::size_t>(nearest - views_.begin());
 }
 
 void TreeEye::turn(double degrees) {

@@ -36,6 +36,8 @@ class TreeEye {
   bool jump(std::size_t view);
   /// The reference view that so many steps lead to, from the one that was last jumped to; nothing without views.
   std::optional<std::size_t> view_after(int steps) const;
+  /// The reference view nearest to the tree's centre; nothing without views.
+  std::optional<std::size_t> middle_view() const;
   /// About up, in degrees: around the object, or the eye alone.
   void turn(double degrees);
   /// Shares of the tree's radius; walking alone.
@@ -49,6 +51,7 @@ class TreeEye {
   void look_along(Eigen::Isometry3d const& object_from_camera);
 
   std::vector<View> views_;
+  Eigen::Vector3d center_;
   double radius_;
   Mode start_, mode_;
   OrbitControl orbit_;

@@ -117,9 +117,10 @@ std::string level_text(LevelCount const& count, Unit unit) {
 
 std::vector<std::string> tree_frame_text(TreePanelContent const& content) {
   constexpr double kMegabyte = 1 << 20, kMillion = 1e6;
+  constexpr char const* kProgress[] = {"refining", "complete", "ended by damage"};
   TreeFigures const& figures = content.figures;
   std::vector<std::string> lines = {
-      fmt::format("{}, {:.1f} ms", content.complete ? "complete" : "refining", figures.milliseconds),
+      fmt::format("{}, {:.1f} ms", kProgress[static_cast<std::size_t>(content.progress)], figures.milliseconds),
       fmt::format("{} cells traversed, {:.2f} M splats", figures.cells, static_cast<double>(figures.splats) / kMillion),
       fmt::format("gaps {:.3g} %, uncovered {:.3g} %", 100 * figures.gaps, 100 * figures.uncovered),
       fmt::format("tree: {} cells, {:.1f} MB", content.cells, static_cast<double>(content.bytes) / kMegabyte)};

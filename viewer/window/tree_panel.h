@@ -22,7 +22,7 @@ struct TreePanelContent : PanelStatus {
     std::string text;
   };
   std::vector<LevelLine> levels;
-  bool complete = false;  ///< a further step would change nothing
+  enum class Progress { refining, complete, damaged } progress = Progress::refining;
   TreeEye::Mode mode = TreeEye::Mode::orbit;
   std::vector<std::string> failures;
   std::size_t keyframes = 0;

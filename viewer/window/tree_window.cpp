@@ -38,6 +38,8 @@ class TreeWindow final : public WindowLoop {
   TreeWindowResult show() {
     TreeWindowResult result;
     if (options_.frames > 0) {
+      // The first view of a scene is often at its border, with nothing behind.
+      if (walks()) jump(eye_.middle_view());
       result.times = measure();
     } else {
       run();
@@ -82,7 +84,10 @@ class TreeWindow final : public WindowLoop {
   void learn_of_picture() {
     LdiTree const& tree = viewed_.tree();
     content_.figures = viewed_.figures();
-    content_.complete = viewed_.is_complete();
+    using Progress = TreePanelContent::Progress;
+    content_.progress = viewed_.has_failed()    ? Progress::damaged
+                        : viewed_.is_complete() ? Progress::complete
+                                                : Progress::refining;
     content_.levels.clear();
     for (LevelCount const& count : content_.figures.levels)
       content_.levels.push_back({level_color(tree, count.level), level_text(count, tree.unit)});

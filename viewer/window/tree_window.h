@@ -21,9 +21,10 @@ struct TreeWindowOptions : BasicWindowOptions {
 
 struct TreeWindowResult {
   std::vector<std::string> failures;  ///< what of the tree is damaged, where the person looked
-  std::optional<FrameTimes> times;    ///< where they were asked for
-  double cells = 0, splats = 0;       ///< over those frames and the few before: mean numbers of a frame
-  double uncovered = 0;               ///< over the same: mean share of pixels that nothing covers
+  /// Where they were asked for: around the object, or of a turn on the spot, at the reference nearest to the centre.
+  std::optional<FrameTimes> times;
+  double cells = 0, splats = 0;  ///< over those frames and the few before: mean numbers of a frame
+  double uncovered = 0;          ///< over the same: mean share of pixels that nothing covers
 };
 
 /// The interactive viewer of an LDI tree; returns when the person closes it. tree_window_help() says the mouse and the

@@ -36,6 +36,7 @@ class ViewedTree {
   cv::Mat4b render_at_once(Camera const& camera, Eigen::Isometry3d const& object_from_camera, TreeLook const& look);
   /// Whether a further step would change nothing.
   bool is_complete() const { return has_failed_ || renderer_.is_complete(); }
+  bool has_failed() const { return has_failed_; }  ///< the picture that is shown was ended by damage
 
   ShownFrame const& shown() const { return shown_; }  ///< without what is drawn over it
   TreeFigures const& figures() const { return figures_; }
@@ -56,7 +57,8 @@ class ViewedTree {
   ShownFrame shown_;
   TreeFigures figures_;
   std::vector<std::string> failures_;
-  bool has_failed_ = false;  ///< the picture that is shown
+  double finishing_milliseconds_ = 0;  ///< after the steps of the last picture that was begun
+  bool has_failed_ = false;            ///< the picture that is shown
 };
 
 }  // namespace scanview
