@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <compare>
 #include <map>
 #include <numbers>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "base/parallel.h"
@@ -28,7 +28,10 @@ struct Edge {
   int coarse = 0;  ///< minus the level: darker, then coarser ones are drawn first
   int axis = 0;
   std::array<std::int64_t, 3> from{};
-  auto operator<=>(Edge const&) const = default;
+  bool operator==(Edge const&) const = default;
+  bool operator<(Edge const& other) const {
+    return std::tie(bright, coarse, axis, from) < std::tie(other.bright, other.coarse, other.axis, other.from);
+  }
 };
 
 void add_edges(std::vector<Edge>& edges, LdiCellKey const& key, bool bright) {
@@ -107,6 +110,7 @@ std::vector<LevelCount> count_levels(LdiTree const& tree, std::vector<TraversedC
     ++(at.descended ? count.descended : count.drawn);
   }
   std::vector<LevelCount> result;
+  result.reserve(counts.size());
   for (auto const& [level, count] : counts) result.push_back(count);
   return result;
 }

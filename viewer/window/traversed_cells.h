@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
 #include "base/context.h"

@@ -69,9 +69,9 @@ class TreeWindow final : public WindowLoop {
 
   cv::Mat4b draw_picture(int width, int height) override {
     PathCamera const eye = camera(width, height);
-    cv::Mat4b const picture = options_.frames > 0
-                                  ? viewed_.render_at_once(eye.camera, eye.object_from_camera, content_.look)
-                                  : viewed_.render(eye.camera, eye.object_from_camera, content_.look, milliseconds_);
+    cv::Mat4b picture = options_.frames > 0
+                            ? viewed_.render_at_once(eye.camera, eye.object_from_camera, content_.look)
+                            : viewed_.render(eye.camera, eye.object_from_camera, content_.look, milliseconds_);
     TreeFigures const& figures = viewed_.figures();
     sum_cells_ += static_cast<double>(figures.cells);
     sum_splats_ += static_cast<double>(figures.splats);
@@ -99,7 +99,7 @@ class TreeWindow final : public WindowLoop {
 
   cv::Mat4b picture_to_save(int width, int height) override {
     PathCamera const eye = camera(width, height);
-    cv::Mat4b const picture = viewed_.render(eye.camera, eye.object_from_camera, content_.look, 0);
+    cv::Mat4b picture = viewed_.render(eye.camera, eye.object_from_camera, content_.look, 0);
     change();  // what is picked in is of that size now
     return picture;
   }
