@@ -1,10 +1,12 @@
 #include "viewer/layered/ldi_renderer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/parallel.h"
 
 namespace scanview {
 namespace {
@@ -118,39 +120,67 @@ Frame LdiRenderer::render_within(double milliseconds, Camera const& camera,
   return picture();
 }
 
-std::size_t LdiRenderer::count_gaps(Frame const& frame, cv::Mat1b& stencil) const {
+/// Marks the gaps where something was drawn around (elsewhere there is nothing to fill them with); returns how many
+/// there are.
+std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
   stencil.create(frame.color.size());
   auto const least = static_cast<uchar>(std::ceil(255 * options.covered));
-  std::size_t count = 0;
-  for (int y = 0; y < stencil.rows; ++y)
-    for (int x = 0; x < stencil.cols; ++x) {
+  std::atomic<std::size_t> gaps = 0;
+  for_each_rows(stencil.rows, [&](int y) {
+    auto const [left, right] = lasting_.touched(y);
+    std::fill(stencil[y], stencil[y] + stencil.cols, uchar{0});
+    std::size_t count = static_cast<std::size_t>(stencil.cols - (right - left));
+    for (int x = left; x < right; ++x) {
       bool const gap = frame.color(y, x)[3] < least;
       stencil(y, x) = gap ? 255 : 0;
       count += gap;
     }
-  return count;
+    gaps += count;
+  });
+  return gaps;
+}
+
+/// Pixels that are covered in part and have no gap around them are within a surface, not on an outline: whole.
+void LdiRenderer::close_seams(cv::Mat1b const& stencil, Frame& frame) {
+  for_each_rows(stencil.rows, [&](int y) {
+    auto const [left, right] = lasting_.touched(y);
+    for (int x = left; x < right; ++x) {
+      cv::Vec4b& pixel = frame.color(y, x);
+      if (pixel[3] == 255 || stencil(y, x) != 0) continue;
+      bool near_gap = false;
+      for (int j = std::max(0, y - 1); j <= std::min(stencil.rows - 1, y + 1); ++j)
+        for (int i = std::max(0, x - 1); i <= std::min(stencil.cols - 1, x + 1); ++i)
+          near_gap = near_gap || stencil(j, i) != 0;
+      if (!near_gap) pixel[3] = 255;
+    }
+  });
+}
+
+void LdiRenderer::for_each_rows(int rows, std::function<void(int)> const& work) {
+  constexpr int kBand = 64;
+  for_each_index(context_, static_cast<std::size_t>((rows + kBand - 1) / kBand), [&](std::size_t band) {
+    for (int y = static_cast<int>(band) * kBand; y < std::min(rows, static_cast<int>(band + 1) * kBand); ++y) work(y);
+  });
 }
 
 /// Two passes (§3.5): the picture is the first, its gaps the stencil. Cells above those that were drawn are taken level
 /// by level, so that a gap is filled with the finest that reaches it.
 void LdiRenderer::fill_gaps(Frame& frame) {
-  if (gaps_ == 0 || options.gaps == LdiRenderOptions::Gaps::background) return;
+  if (options.gaps == LdiRenderOptions::Gaps::background) return;
   cv::Mat1b stencil;
-  count_gaps(frame, stencil);
-  std::map<int, std::vector<TraversedCell>> levels;
+  find_gaps(frame, stencil);
+  std::map<int, std::vector<CellPart>> levels;
   for (TraversedCell const& at : traversed_)
-    if (at.descended) levels[tree_->cells[static_cast<std::size_t>(at.cell)].key.level].push_back(at);
-  for (auto& [level, cells] : levels) {
-    std::stable_sort(cells.begin(), cells.end(),
-                     [](TraversedCell const& a, TraversedCell const& b) { return a.distance < b.distance; });
-    std::vector<CellPart> parts;
-    for (TraversedCell const& at : cells) parts.push_back({at.cell, LdiKind::filtered});
+    if (at.descended)
+      levels[tree_->cells[static_cast<std::size_t>(at.cell)].key.level].push_back({at.cell, LdiKind::filtered});
+  for (auto const& [level, parts] : levels) {
+    if (uncovered_ == 0) break;
     filling_.begin(camera_, object_from_camera_);
     splats_ += filling_.draw(*tree_, parts, stencil, context_);
-    filling_.compose_into(stencil, frame, context_);
-    uncovered_ = count_gaps(frame, stencil);
-    if (uncovered_ == 0) return;
+    filling_.fill_beneath(stencil, frame, context_);
+    uncovered_ = find_gaps(frame, stencil);
   }
+  close_seams(stencil, frame);
 }
 
 }  // namespace scanview

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -56,7 +57,9 @@ class LdiRenderer : public Renderer {
  private:
   void draw(std::vector<TraversedCell> const& cells);
   void fill_gaps(Frame& frame);
-  std::size_t count_gaps(Frame const& frame, cv::Mat1b& stencil) const;
+  std::size_t find_gaps(Frame const& frame, cv::Mat1b& stencil);
+  void close_seams(cv::Mat1b const& stencil, Frame& frame);
+  void for_each_rows(int rows, std::function<void(int)> const& work);
 
   std::shared_ptr<LdiTree const> tree_;
   Context context_;

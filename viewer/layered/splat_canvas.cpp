@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+#include <optional>
 
 #include "base/parallel.h"
+#include "base/srgb.h"
 #include "viewer/layered/ldi_traversal.h"
 
 namespace scanview {
@@ -27,6 +29,8 @@ struct SplatCanvas::DrawnBlock {
   std::uint32_t cell, first;
   std::uint16_t count;
   std::uint8_t face;
+  bool fills;
+  float nearest;                 // depth
   int left, right, top, bottom;  // pixels that it may reach
 };
 
@@ -35,7 +39,9 @@ void SplatCanvas::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
   camera_from_object_ = object_from_camera.inverse();
   std::size_t const size = stride() * static_cast<std::size_t>(camera.height());
   if (size > capacity_) {
-    for (auto& layer : layers_) layer = std::make_unique_for_overwrite<OutputLayer[]>(size);
+    // Layers of a pixel apart from one another, too.
+    layer_size_ = size + 32;
+    layers_ = std::make_unique_for_overwrite<OutputLayer[]>(kOutputLayers * layer_size_);
     capacity_ = size;
   }
   counts_.resize(size);
@@ -46,7 +52,8 @@ OutputArea SplatCanvas::area(std::size_t band, cv::Mat1b const& stencil) const {
   int const top = static_cast<int>(band) * kBand;
   std::size_t const first = static_cast<std::size_t>(top) * stride() + 1;
   OutputArea area;
-  for (int k = 0; k < kOutputLayers; ++k) area.layers[k] = layers_[k].get() + first;
+  for (int k = 0; k < kOutputLayers; ++k)
+    area.layers[k] = layers_.get() + static_cast<std::size_t>(k) * layer_size_ + first;
   area.counts = const_cast<std::uint8_t*>(counts_.data()) + first;
   area.stencil = stencil.empty() ? nullptr : stencil.ptr(top);
   area.stride = static_cast<int>(stride());
@@ -54,6 +61,8 @@ OutputArea SplatCanvas::area(std::size_t band, cv::Mat1b const& stencil) const {
   area.right = camera_.width();
   area.top = top;
   area.bottom = std::min(top + kBand, camera_.height());
+  area.first_x = area.left, area.end_x = area.right;
+  area.first_y = area.top, area.end_y = area.bottom;
   return area;
 }
 
@@ -99,12 +108,51 @@ SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, 
 
 }  // namespace
 
+namespace {
+
+struct PixelBox {
+  int left = 1 << 30, right = 0, top = 1 << 30, bottom = 0;
+  void add(PixelBox const& other) {
+    left = std::min(left, other.left), right = std::max(right, other.right);
+    top = std::min(top, other.top), bottom = std::max(bottom, other.bottom);
+  }
+};
+
+/// Where in a rectangle pixels are to be drawn on, by tiles.
+class StencilTiles {
+ public:
+  explicit StencilTiles(cv::Mat1b const& stencil)
+      : columns_((stencil.cols + kTile - 1) / kTile),
+        boxes_(static_cast<std::size_t>(columns_ * ((stencil.rows + kTile - 1) / kTile))) {
+    for (int y = 0; y < stencil.rows; ++y)
+      for (int x = 0; x < stencil.cols; ++x)
+        if (stencil(y, x) != 0) boxes_[place(x / kTile, y / kTile)].add({x, x + 1, y, y + 1});
+  }
+  /// Of all within it or near; empty (left ≥ right) where there are none.
+  PixelBox within(int left, int right, int top, int bottom) const {
+    PixelBox box;
+    for (int y = top / kTile; y <= (bottom - 1) / kTile; ++y)
+      for (int x = left / kTile; x <= (right - 1) / kTile; ++x) box.add(boxes_[place(x, y)]);
+    return box;
+  }
+
+ private:
+  static constexpr int kTile = 16;
+  std::size_t place(int x, int y) const { return static_cast<std::size_t>(y * columns_ + x); }
+  int columns_;
+  std::vector<PixelBox> boxes_;
+};
+
+}  // namespace
+
 std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& parts, cv::Mat1b const& stencil,
                               Context& context) {
   double const near = nearest_drawn(tree);
   std::vector<DrawnCell> cells(parts.size());
   std::vector<std::vector<DrawnBlock>> blocks_of(parts.size());
   int const width = camera_.width(), height = camera_.height();
+  std::optional<StencilTiles> tiles;
+  if (!stencil.empty()) tiles.emplace(stencil);
   constexpr std::size_t kGrain = 16;
   for_each_index(context, (parts.size() + kGrain - 1) / kGrain, [&](std::size_t grain) {
     for (std::size_t p = grain * kGrain; p < std::min(parts.size(), (grain + 1) * kGrain); ++p) {
@@ -142,7 +190,16 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
           least_v = std::min(least_v, v), most_v = std::max(most_v, v);
           least_z = std::min(least_z, depth), most_z = std::max(most_z, depth);
         }
-        DrawnBlock one{static_cast<std::uint32_t>(p), block.first, block.count, block.face, 0, width, 0, height};
+        DrawnBlock one{static_cast<std::uint32_t>(p),
+                       block.first,
+                       block.count,
+                       block.face,
+                       parts[p].kind == LdiKind::patch,
+                       least_z,
+                       0,
+                       width,
+                       0,
+                       height};
         if (t.perspective && most_z <= t.near) continue;
         if (!t.perspective || least_z > t.near) {
           // Splats reach about as far as two grid steps, at least a pixel.
@@ -156,6 +213,12 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
           one.right = clamped(std::ceil(most_u + reach) + 1, width);
           one.top = clamped(std::floor(least_v - reach), height);
           one.bottom = clamped(std::ceil(most_v + reach) + 1, height);
+          if (one.left >= one.right || one.top >= one.bottom) continue;
+        }
+        if (tiles) {
+          PixelBox const box = tiles->within(one.left, one.right, one.top, one.bottom);
+          one.left = std::max(one.left, box.left), one.right = std::min(one.right, box.right);
+          one.top = std::max(one.top, box.top), one.bottom = std::min(one.bottom, box.bottom);
           if (one.left >= one.right || one.top >= one.bottom) continue;
         }
         blocks_of[p].push_back(one);
@@ -177,10 +240,19 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
       }
   std::atomic<std::size_t> splats = 0;
   for_each_index(context, of_band.size(), [&](std::size_t band) {
-    OutputArea const target = area(band, stencil);
+    OutputArea const whole = area(band, stencil);
     std::size_t drawn = 0;
+    // Nearest first, so that what is hidden is lost at once; patches after all others.
+    std::stable_sort(of_band[band].begin(), of_band[band].end(), [](DrawnBlock const& a, DrawnBlock const& b) {
+      return a.fills != b.fills ? b.fills : a.nearest < b.nearest;
+    });
     for (DrawnBlock const& block : of_band[band]) {
       DrawnCell const& cell = cells[block.cell];
+      OutputArea target = whole;
+      if (!stencil.empty()) {
+        target.first_x = block.left, target.end_x = block.right;
+        target.first_y = std::max(whole.top, block.top), target.end_y = std::min(whole.bottom, block.bottom);
+      }
       drawn += draw_splats(cell.pixels, block.first, block.count, cell.transforms[block.face], target);
     }
     splats += drawn;
@@ -223,14 +295,34 @@ std::size_t SplatCanvas::compose(SplatCanvas const* more, float covered, Frame& 
   return bare;
 }
 
-void SplatCanvas::compose_into(cv::Mat1b const& stencil, Frame& frame, Context& context) const {
+void SplatCanvas::fill_beneath(cv::Mat1b const& stencil, Frame& frame, Context& context) const {
   for_each_index(context, bands(), [&](std::size_t band) {
     int const top = static_cast<int>(band) * kBand, bottom = std::min(top + kBand, camera_.height());
     Touched const touched = touched_[band];
-    OutputArea const mine = area(band, stencil);
-    for (int y = top; y < bottom && touched.left < touched.right; ++y) {
-      PictureRow const row{static_cast<std::uint32_t*>(static_cast<void*>(frame.color.ptr(y))), frame.depth[y]};
-      compose_splats(mine, nullptr, y, touched.left, touched.right, camera_.is_perspective(), 0, row);
+    if (touched.left >= touched.right) return;
+    OutputArea const mine = area(band, {});
+    std::vector<std::uint32_t> colors(static_cast<std::size_t>(camera_.width()));
+    std::vector<float> depths(colors.size());
+    auto const& linear = linear_from_srgb8();
+    for (int y = top; y < bottom; ++y) {
+      uchar const* const wanted = stencil.ptr(y);
+      if (std::none_of(wanted + touched.left, wanted + touched.right, [](uchar one) { return one != 0; })) continue;
+      compose_splats(mine, nullptr, y, touched.left, touched.right, camera_.is_perspective(), 0,
+                     {colors.data(), depths.data()});
+      for (int x = touched.left; x < touched.right; ++x) {
+        std::uint32_t const below = colors[static_cast<std::size_t>(x)];
+        // The outline of what is filtered lies where it covers a half.
+        double const cover = std::clamp(2 * double(below >> 24) / 255 - 1, 0.0, 1.0);
+        if (wanted[x] == 0 || cover == 0) continue;
+        cv::Vec4b& pixel = frame.color(y, x);
+        double const alpha = pixel[3] / 255.0, share = (1 - alpha) * cover, sum = alpha + share;
+        for (int c = 0; c < 3; ++c) {
+          double const light = (alpha * linear[pixel[c]] + share * linear[below >> 8 * c & 255]) / sum;
+          pixel[c] = static_cast<uchar>(std::lround(255 * srgb_from_linear(light)));
+        }
+        pixel[3] = static_cast<uchar>(std::lround(255 * sum));
+        if (share > alpha) frame.depth(y, x) = depths[static_cast<std::size_t>(x)];
+      }
     }
   });
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "base/context.h"
@@ -28,8 +29,14 @@ class SplatCanvas {
   /// The layers composed from the front (§3.3), of this canvas and, where there is one, of another that was begun for
   /// the same camera. Returns the number of pixels that are covered less than `covered`.
   std::size_t compose(SplatCanvas const* more, float covered, Frame& frame, Context& context) const;
-  /// Only pixels where the stencil is not 0 are changed.
-  void compose_into(cv::Mat1b const& stencil, Frame& frame, Context& context) const;
+  /// Columns [first, second) of a row in which something may have been drawn.
+  std::pair<int, int> touched(int y) const {
+    Touched const& band = touched_[static_cast<std::size_t>(y / kBand)];
+    return {std::min(band.left, band.right), band.right};
+  }
+  /// Draws what this canvas holds beneath a picture, where the stencil is not 0. Of what covers a place by no more than
+  /// a half nothing is drawn: what is filtered reaches beyond outlines.
+  void fill_beneath(cv::Mat1b const& stencil, Frame& frame, Context& context) const;
 
  private:
   struct DrawnBlock;
@@ -37,13 +44,15 @@ class SplatCanvas {
   static constexpr int kBand = 32;
   std::size_t bands() const { return static_cast<std::size_t>((camera_.height() + kBand - 1) / kBand); }
   OutputArea area(std::size_t band, cv::Mat1b const& stencil) const;
-  /// Pixels from row to row: one more on both sides, which kernels may write to.
-  std::size_t stride() const { return static_cast<std::size_t>(camera_.width()) + 2; }
+  /// Pixels from row to row: at least one more on both sides, which kernels may write to. 512 bytes beyond a multiple
+  /// of 4096: sixteen pixels of each of sixteen rows do not push one another out of the nearest cache.
+  std::size_t stride() const { return (static_cast<std::size_t>(camera_.width()) + 2 + 111) / 128 * 128 + 16; }
 
   Camera camera_;
   Eigen::Isometry3d camera_from_object_;
   std::size_t capacity_ = 0;
-  std::unique_ptr<OutputLayer[]> layers_[kOutputLayers];
+  std::unique_ptr<OutputLayer[]> layers_;
+  std::size_t layer_size_ = 0;
   std::vector<std::uint8_t> counts_;
   struct Touched {
     int left = 1 << 30, right = 0;  ///< columns in which something may have been drawn

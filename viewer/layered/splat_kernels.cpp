@@ -26,6 +26,9 @@ struct alignas(64) Splats {
   std::int32_t x[16], y[16];
 };
 
+/// Of a kernel, in grid steps as they are on the screen: narrower than the grid, with which it would add up to 1
+/// everywhere, but a third faster and as accurate.
+constexpr float kReach = 0.8F;
 /// Whatever is behind so much is not seen.
 constexpr float kOpaque = 0.8F;
 /// A patch is drawn on nothing that is covered so much by another surface.
@@ -118,10 +121,10 @@ struct RowSample {
 template <bool kFills, bool kStencil>
 HWY_INLINE void DrawWide(Splats const& s, std::size_t i, OutputArea const& area) {
   float const u = s.u[i], v = s.v[i], reach_u = s.reach_u[i], reach_v = s.reach_v[i];
-  int const left = std::max(area.left, static_cast<int>(std::ceil(u - reach_u))),
-            right = std::min(area.right - 1, static_cast<int>(std::floor(u + reach_u)));
-  int const top = std::max(area.top, static_cast<int>(std::ceil(v - reach_v))),
-            bottom = std::min(area.bottom - 1, static_cast<int>(std::floor(v + reach_v)));
+  int const left = std::max(area.first_x, static_cast<int>(std::ceil(u - reach_u))),
+            right = std::min(area.end_x - 1, static_cast<int>(std::floor(u + reach_u)));
+  int const top = std::max(area.first_y, static_cast<int>(std::ceil(v - reach_v))),
+            bottom = std::min(area.end_y - 1, static_cast<int>(std::floor(v + reach_v)));
   if (left > right) return;
   float const per_u = 1 / reach_u, per_v = 1 / reach_v, weight = s.weight[i], first = float(left) - u;
   for (int y = top; y <= bottom; ++y) {
@@ -223,12 +226,14 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
     if (t.facing != 0) valid = hn::And(valid, hn::Gt(hn::Mul(area_signed, hn::Set(d, t.facing)), zero));
     auto const widest = hn::Set(d, t.widest);
     auto const least = hn::Set(d, t.least);
-    auto const reach_u = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy)))));
-    auto const reach_v = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy)))));
-    valid = hn::And(valid, hn::Gt(hn::Add(u, reach_u), hn::Set(d, float(area.left))));
-    valid = hn::And(valid, hn::Lt(hn::Sub(u, reach_u), hn::Set(d, float(area.right - 1))));
-    valid = hn::And(valid, hn::Gt(hn::Add(v, reach_v), hn::Set(d, float(area.top))));
-    valid = hn::And(valid, hn::Lt(hn::Sub(v, reach_v), hn::Set(d, float(area.bottom - 1))));
+    auto const reach_u = hn::Min(
+        widest, hn::Max(least, hn::Mul(hn::Set(d, kReach), hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy))))));
+    auto const reach_v = hn::Min(
+        widest, hn::Max(least, hn::Mul(hn::Set(d, kReach), hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy))))));
+    valid = hn::And(valid, hn::Gt(hn::Add(u, reach_u), hn::Set(d, float(area.first_x))));
+    valid = hn::And(valid, hn::Lt(hn::Sub(u, reach_u), hn::Set(d, float(area.end_x - 1))));
+    valid = hn::And(valid, hn::Gt(hn::Add(v, reach_v), hn::Set(d, float(area.first_y))));
+    valid = hn::And(valid, hn::Lt(hn::Sub(v, reach_v), hn::Set(d, float(area.end_y - 1))));
     if (hn::AllFalse(d, valid)) continue;
     auto const color = hn::LoadU(du, pixels.color + i);
     auto const channel = [&](auto bits) HWY_ATTR {
@@ -236,7 +241,8 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
       return hn::Mul(hn::Mul(root, root), hn::Set(d, 1.0F / (255.0F * 255.0F)));
     };
     auto const alpha = hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(color))), hn::Set(d, 1.0F / 255));
-    auto const weight = hn::Mul(alpha, hn::Min(one, hn::Div(stamp, hn::Mul(reach_u, reach_v))));
+    auto const weight =
+        hn::Mul(alpha, hn::Min(hn::Set(d, 1 / (kReach * kReach)), hn::Div(stamp, hn::Mul(reach_u, reach_v))));
     // Gradient on the screen of the key, whose change with x is −zx / z² (perspective) or −zx.
     auto const per_z2 = hn::Mul(per_z, per_z);
     auto const per_area = hn::Div(one, hn::IfThenElse(hn::Gt(stamp, hn::Set(d, 1e-6F)), area_signed, one));

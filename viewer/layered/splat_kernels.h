@@ -27,6 +27,7 @@ struct OutputArea {
   std::uint8_t* counts;         ///< of each pixel's layers
   std::uint8_t const* stencil;  ///< not null: only pixels where it is not 0 are drawn on; rows of right − left pixels
   int stride, left, top, right, bottom;
+  int first_x, first_y, end_x, end_y;  ///< nothing is drawn outside of this part of it
 };
 
 /// From grid steps of a cell's face (x, y, depth in steps, 1) to u z, v z and z of the output's camera (perspective) or
