@@ -21,8 +21,8 @@ struct Session {
   bool quiet = false;
   std::vector<std::string> settings;  ///< --set KEY=VALUE, as given
   Json report = Json::object();       ///< the verb's keys
-  int exit_code = 0;                  ///< 0, or 6 where part of the views failed
-  std::function<void()> work;         ///< set by the verb that was named
+  int exit_code = 0;  ///< 0; where what was done is not whole: 6 (part of the views failed), 3 (of damaged input)
+  std::function<void()> work;  ///< set by the verb that was named
   std::string verb;
 };
 

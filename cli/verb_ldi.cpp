@@ -108,6 +108,7 @@ void draw_tree(LdiArguments const& arguments, Session& session) {
                      kFilmMilliseconds);
   LdiRenderer renderer(tree, arguments.options.draw, context.threads);
   std::vector<double> times;
+  std::map<std::int32_t, std::string> damaged;
   session.report["frames"] = Json::array();
   for (PathCamera const& from : path) {
     context.check_cancelled();
@@ -123,11 +124,18 @@ void draw_tree(LdiArguments const& arguments, Session& session) {
                                         {"stages", renderer.stages()},
                                         {"cells_traversed", renderer.traversed().size()},
                                         {"splats", renderer.splats()},
+                                        {"damaged_cells", renderer.damaged().size()},
                                         {"uncovered", double(renderer.uncovered()) / double(drawn.color.total())},
                                         {"complete", renderer.is_complete()}});
+    damaged.insert(renderer.damaged().begin(), renderer.damaged().end());
     context.progress("render", times.size(), path.size());
   }
   folder.finish();
+  if (!damaged.empty()) {
+    context.warn(fmt::format("{}; {} of {} cells are left out of the frames", damaged.begin()->second, damaged.size(),
+                             tree->cells.size()));
+    session.exit_code = static_cast<int>(ErrorCode::bad_input);
+  }
   session.report["fps_median"] = times.empty() ? 0 : 1e3 / median(times);
   std::cout << fmt::format("{} frames, {:.2f} ms each\n", path.size(), times.empty() ? 0 : median(times));
 }

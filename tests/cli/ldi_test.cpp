@@ -53,6 +53,10 @@ class Ldi : public VerbTest {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
+  /// Where the cells' content begins in a file.
+  static std::size_t content_of(std::string const& bytes, LdiTree const& tree) {
+    return bytes.find(std::string_view(reinterpret_cast<char const*>(tree.content.data()), tree.content.size()));
+  }
   void refused(int code, std::vector<std::string> const& texts, std::vector<std::string> const& arguments) const {
     CommandResult const result = run_scanview(arguments);
     EXPECT_EQ(result.exit_code, code) << result.errors;
@@ -254,6 +258,21 @@ TEST_F(Ldi, WhatItCannotUseIsRefusedByName) {
     write_file(in("cut.ldi"), bytes.substr(0, std::size_t(share * double(bytes.size()))));
     refused(3, {"cut.ldi"}, render("cut.ldi", {"--orbit", "1"}));
   }
+  // Of a damaged cell frames lack that cell alone: a warning, and not whole.
+  {
+    LdiTree const tree = read_ldi(in("tree.ldi"));
+    std::string damaged = bytes;
+    damaged[content_of(bytes, tree) + tree.cells.back().offset] ^= 1;
+    write_file(in("damaged.ldi"), damaged);
+  }
+  CommandResult const part = run_scanview(render("damaged.ldi", {"--like", "000", "--report", in("part.json")}));
+  EXPECT_EQ(part.exit_code, 3);
+  EXPECT_THAT(part.errors, HasSubstr("damaged.ldi"));
+  EXPECT_THAT(part.errors, HasSubstr("1 of "));
+  EXPECT_TRUE(fs::exists(in("pictures/000.png")));
+  Json const of_part = Json::parse(read_file(in("part.json")));
+  EXPECT_EQ(of_part["warnings"].size(), 1U);
+  EXPECT_EQ(of_part["frames"][0]["damaged_cells"], 1);
   refused(3, {"cut.ldi"}, {"info", in("cut.ldi")});
   refused(3, {"cut.ldi"}, {"ldi", "add", in("cut.ldi"), in("set")});
   write_file(in("other.ldi"), "ply\nformat ascii 1.0\n");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
 #include "base/files.h"
@@ -220,7 +221,7 @@ TEST(LdiPictures, AndFilesDependNeitherOnOrderNorOnThreads) {
   EXPECT_EQ(cv::norm(a.color, b.color, cv::NORM_INF), 0);
 }
 
-TEST(LdiPictures, OfADamagedCellAreRefusedWhenItIsDrawn) {
+TEST(LdiPictures, OfADamagedFileLackItsDamagedCells) {
   TemporaryFolder const folder;
   auto const path = folder.path() / "tree.ldi";
   Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
@@ -230,18 +231,73 @@ TEST(LdiPictures, OfADamagedCellAreRefusedWhenItIsDrawn) {
   Context context;
   write_ldi(path, builder.build(Unit::m, context), builder, LdiKeep::tree_alone);
   std::string bytes = read_file(path);
+  auto const whole = std::make_shared<LdiTree>(read_ldi(path));
+  LdiRenderer before(whole, {});
+  Camera const camera = square_view(200);
+  Frame const all = before.render(camera, pose);
+  EXPECT_TRUE(before.damaged().empty());
   bytes[bytes.size() - kLdiPadding - 32] ^= 1;
   write_file(path, bytes);
-  LdiTree const tree = read_ldi(path);
+  LdiRenderer renderer(std::make_shared<LdiTree>(read_ldi(path)), {});
   // What does not show the last of its cells does not read it.
-  EXPECT_NO_THROW(picture(tree, square_view(4), pose));
-  try {
-    picture(tree, square_view(200), pose);
-    ADD_FAILURE() << "no error";
-  } catch (Error const& error) {
-    EXPECT_EQ(error.code(), ErrorCode::bad_input);
-    EXPECT_EQ(error.path(), path);
+  renderer.render(square_view(4), pose);
+  EXPECT_TRUE(renderer.damaged().empty());
+  for (int turn = 0; turn < 2; ++turn) {
+    Frame const frame = renderer.render(camera, pose);
+    ASSERT_EQ(renderer.damaged().size(), 1U);
+    auto const& [cell, why] = *renderer.damaged().begin();
+    EXPECT_EQ(cell, static_cast<std::int32_t>(whole->cells.size()) - 1);
+    EXPECT_NE(why.find("tree.ldi"), std::string::npos);
+    EXPECT_NE(why.find("damaged"), std::string::npos);
+    // Away from the cell nothing changes; where it is, coarser ones fill in.
+    Eigen::AlignedBox3d box = whole->box(whole->cells.back());
+    box.min() -= 0.1 * Vector3d::Ones();
+    box.max() += 0.1 * Vector3d::Ones();
+    std::size_t same = 0, other = 0;
+    for (int y = 0; y < camera.height(); ++y)
+      for (int x = 0; x < camera.width(); ++x) {
+        if (all.color(y, x)[3] < 128) continue;
+        bool const equal = frame.color(y, x) == all.color(y, x);
+        bool const within = box.contains(pose * camera.unproject(x, y, double(all.depth(y, x))));
+        EXPECT_TRUE(equal || within) << x << ' ' << y;
+        (equal ? same : other) += 1;
+      }
+    EXPECT_GT(other, 0U);
+    EXPECT_GT(same, 10 * other);
   }
+  renderer.render(square_view(4), pose);
+  EXPECT_TRUE(renderer.damaged().empty());
+}
+
+TEST(LdiPictures, OfOneCameraHaveTheSameFiguresHoweverOftenTheyAreTaken) {
+  // From nearer than the reference, with a hole that the cells above fill.
+  Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
+  View view = slanted(square_view(64), pose);
+  cv::circle(view.image.depth, {30, 30}, 3, cv::Scalar(kMissing), -1);
+  LdiOptions options;
+  options.resolution = 16;
+  LdiRenderer renderer(std::make_shared<LdiTree>(tree_of({view}, options)), {});
+  Camera const camera = square_view(160);
+  Frame const first = renderer.render(camera, pose);
+  std::size_t const splats = renderer.splats(), filling = renderer.filling_splats(), gaps = renderer.gaps(),
+                    uncovered = renderer.uncovered();
+  EXPECT_GT(filling, 0U);
+  EXPECT_GT(splats, filling);
+  for (int i = 0; i < 3; ++i) {
+    Frame const again = renderer.picture();
+    EXPECT_EQ(renderer.splats(), splats);
+    EXPECT_EQ(renderer.filling_splats(), filling);
+    EXPECT_EQ(renderer.gaps(), gaps);
+    EXPECT_EQ(renderer.uncovered(), uncovered);
+    EXPECT_EQ(cv::norm(again.color, first.color, cv::NORM_INF), 0);
+  }
+  renderer.options.gaps = LdiRenderOptions::Gaps::background;
+  renderer.picture();
+  EXPECT_EQ(renderer.filling_splats(), 0U);
+  EXPECT_EQ(renderer.splats(), splats - filling);
+  renderer.options.gaps = LdiRenderOptions::Gaps::filled;
+  renderer.render(camera, pose);
+  EXPECT_EQ(renderer.splats(), splats);
 }
 
 }  // namespace

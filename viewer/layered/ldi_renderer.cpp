@@ -36,9 +36,16 @@ void LdiRenderer::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
   has_passing_ = false;
   traversed_.clear();
   postponed_.clear();
-  splats_ = gaps_ = uncovered_ = 0;
+  splats_ = filling_splats_ = gaps_ = uncovered_ = 0;
+  damaged_.clear();
   until_px_ = 0;
   stages_.clear();
+}
+
+std::size_t LdiRenderer::draw_on(SplatCanvas& canvas, std::vector<CellPart> const& parts, cv::Mat1b const& stencil) {
+  std::size_t const splats = canvas.draw(*tree_, parts, stencil, context_);
+  damaged_.insert(canvas.damaged().begin(), canvas.damaged().end());
+  return splats;
 }
 
 /// Pixels that stay go to the lasting canvas, those that finer ones will replace to the passing one; patches last.
@@ -56,11 +63,11 @@ void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
   }
   for (TraversedCell const& at : cells) lasting.push_back({at.cell, LdiKind::patch});
   traversed_.insert(traversed_.end(), cells.begin(), cells.end());
-  splats_ += lasting_.draw(*tree_, lasting, {}, context_);
+  splats_ += draw_on(lasting_, lasting, {});
   has_passing_ = !passing.empty();
   if (has_passing_) {
     passing_.begin(camera_, object_from_camera_);
-    splats_ += passing_.draw(*tree_, passing, {}, context_);
+    splats_ += draw_on(passing_, passing, {});
   }
 }
 
@@ -84,6 +91,7 @@ bool LdiRenderer::refine() {
 Frame LdiRenderer::picture() {
   double start = now();
   Frame frame;
+  filling_splats_ = 0;
   gaps_ = uncovered_ =
       lasting_.compose(has_passing_ ? &passing_ : nullptr, static_cast<float>(options.covered), frame, context_);
   stages_["compose"] += now() - start;
@@ -176,7 +184,7 @@ void LdiRenderer::fill_gaps(Frame& frame) {
   for (auto const& [level, parts] : levels) {
     if (uncovered_ == 0) break;
     filling_.begin(camera_, object_from_camera_);
-    splats_ += filling_.draw(*tree_, parts, stencil, context_);
+    filling_splats_ += draw_on(filling_, parts, stencil);
     filling_.fill_beneath(stencil, frame, context_);
     uncovered_ = find_gaps(frame, stencil);
   }

@@ -117,7 +117,7 @@ std::string level_text(LevelCount const& count, Unit unit) {
 
 std::vector<std::string> tree_frame_text(TreePanelContent const& content) {
   constexpr double kMegabyte = 1 << 20, kMillion = 1e6;
-  constexpr char const* kProgress[] = {"refining", "complete", "ended by damage"};
+  constexpr char const* kProgress[] = {"refining", "complete", "complete but for damage"};
   TreeFigures const& figures = content.figures;
   std::vector<std::string> lines = {
       fmt::format("{}, {:.1f} ms", kProgress[static_cast<std::size_t>(content.progress)], figures.milliseconds),

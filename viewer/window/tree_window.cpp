@@ -85,9 +85,9 @@ class TreeWindow final : public WindowLoop {
     LdiTree const& tree = viewed_.tree();
     content_.figures = viewed_.figures();
     using Progress = TreePanelContent::Progress;
-    content_.progress = viewed_.has_failed()    ? Progress::damaged
-                        : viewed_.is_complete() ? Progress::complete
-                                                : Progress::refining;
+    content_.progress = !viewed_.is_complete() ? Progress::refining
+                        : viewed_.has_failed() ? Progress::damaged
+                                               : Progress::complete;
     content_.levels.clear();
     for (LevelCount const& count : content_.figures.levels)
       content_.levels.push_back({level_color(tree, count.level), level_text(count, tree.unit)});

@@ -28,8 +28,8 @@ struct TreeWindowResult {
 };
 
 /// The interactive viewer of an LDI tree; returns when the person closes it. tree_window_help() says the mouse and the
-/// keys. A damaged cell ends a picture where it is met; the panel says so, and a warning. Throws Error{io} where there
-/// is no display or the OpenGL context is lost, Error{bad_input} where frames are measured and a cell is damaged.
+/// keys. Damaged cells are left out of pictures; the panel says so, and a warning. Throws Error{io} where there
+/// is no display or the OpenGL context is lost.
 TreeWindowResult view_ldi_tree(std::shared_ptr<LdiTree const> tree, TreeWindowOptions const& options, Context& context);
 
 }  // namespace scanview

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <utility>
-
-#include "base/error.h"
-
 namespace scanview {
 namespace {
 
@@ -30,7 +27,6 @@ void ViewedTree::begin(Camera const& camera, Eigen::Isometry3d const& object_fro
   shown_.camera = camera;
   shown_.object_from_camera = object_from_camera;
   look_ = look;
-  has_failed_ = false;
   figures_.milliseconds = 0;
 }
 
@@ -42,12 +38,7 @@ cv::Mat4b ViewedTree::render(Camera const& camera, Eigen::Isometry3d const& obje
   look_ = look;
   if (goes_on && is_complete()) return painted();
   double const start = now();
-  try {
-    take_steps(goes_on, milliseconds);
-  } catch (Error const& error) {
-    if (error.code() != ErrorCode::bad_input) throw;
-    fail(error.what());
-  }
+  take_steps(goes_on, milliseconds);
   count(now() - start);
   return painted();
 }
@@ -62,14 +53,6 @@ void ViewedTree::take_steps(bool goes_on, double milliseconds) {
   }
   if (!goes_on) renderer_.begin(shown_.camera, shown_.object_from_camera);
   while (renderer_.refine() && milliseconds == 0) continue;
-  shown_.frame = renderer_.picture();
-}
-
-/// What steps before have drawn is still there; filling gaps would read the tree again.
-void ViewedTree::fail(std::string const& why) {
-  has_failed_ = true;
-  if (std::find(failures_.begin(), failures_.end(), why) == failures_.end()) failures_.push_back(why);
-  renderer_.options.gaps = LdiRenderOptions::Gaps::background;
   shown_.frame = renderer_.picture();
 }
 
@@ -90,6 +73,8 @@ void ViewedTree::count(double milliseconds) {
   figures_.uncovered = static_cast<double>(renderer_.uncovered()) / pixels;
   figures_.milliseconds += milliseconds;
   figures_.levels = count_levels(tree(), renderer_.traversed());
+  for (auto const& [cell, why] : renderer_.damaged())
+    if (std::find(failures_.begin(), failures_.end(), why) == failures_.end()) failures_.push_back(why);
 }
 
 cv::Mat4b ViewedTree::painted() {

@@ -28,15 +28,15 @@ class ViewedTree {
 
   LdiTree const& tree() const { return renderer_.tree(); }
   /// From a camera of the picture's size; kept. A camera or a look that is new begins, with as many steps as fit into
-  /// so many milliseconds (0: all); the same once more takes a further step. Where the tree is damaged the picture
-  /// ends with what was drawn before, and failures() says so.
+  /// so many milliseconds (0: all); the same once more takes a further step. Damaged
+  /// cells are left out, and failures() says so.
   cv::Mat4b render(Camera const& camera, Eigen::Isometry3d const& object_from_camera, TreeLook const& look,
                    double milliseconds);
-  /// In one step, which is quicker than several. Throws Error{bad_input} where the tree is damaged.
+  /// In one step, which is quicker than several.
   cv::Mat4b render_at_once(Camera const& camera, Eigen::Isometry3d const& object_from_camera, TreeLook const& look);
   /// Whether a further step would change nothing.
-  bool is_complete() const { return has_failed_ || renderer_.is_complete(); }
-  bool has_failed() const { return has_failed_; }  ///< the picture that is shown was ended by damage
+  bool is_complete() const { return renderer_.is_complete(); }
+  bool has_failed() const { return !renderer_.damaged().empty(); }  ///< cells of the picture that is shown are damaged
 
   ShownFrame const& shown() const { return shown_; }  ///< without what is drawn over it
   TreeFigures const& figures() const { return figures_; }
@@ -46,7 +46,6 @@ class ViewedTree {
  private:
   void begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera, TreeLook const& look);
   void take_steps(bool goes_on, double milliseconds);
-  void fail(std::string const& why);
   void count(double milliseconds);
   cv::Mat4b painted();
 
@@ -58,7 +57,6 @@ class ViewedTree {
   TreeFigures figures_;
   std::vector<std::string> failures_;
   double finishing_milliseconds_ = 0;  ///< after the steps of the last picture that was begun
-  bool has_failed_ = false;            ///< the picture that is shown
 };
 
 }  // namespace scanview
