@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -366,6 +367,74 @@ TEST(LdiTree, APlaneKeepsItsColourCoverAndDepthAtEveryLevel) {
     ++counts[std::get<0>(place)];
   }
   for (int level = finest; level < top; ++level) EXPECT_GT(counts[level], 20) << level;
+}
+
+TEST(LdiTree, RimsCountOnlyWhereNothingElseShowsAPlace) {
+  // A hole in a white plane, whose rim is black as if mixed with what is behind; another image shows all of it.
+  Camera const camera = Camera::orthographic(24, 24, 1, 1, 11.5, 11.5);
+  auto const seen = [&](Vector3d const& at) {
+    return plane_view("a", camera, toward(at + Vector3d(0, 0, 50), at), Vector3d::UnitZ(), 0.3,
+                      plain_paint({255, 255, 255}));
+  };
+  View torn = seen({0.4, 0.3, 0});
+  for (int y = 8; y < 14; ++y)
+    for (int x = 8; x < 14; ++x) {
+      torn.image.color(y, x) = {0, 0, 0};
+      if (x > 8 && x < 13 && y > 8 && y < 13) torn.image.depth(y, x) = kMissing;
+    }
+  std::vector<Stamp> stamps;
+  StampReader(torn, {}).read_row(8, stamps);
+  for (std::size_t x = 0; x < stamps.size(); ++x) EXPECT_EQ(stamps[x].rim, x >= 8 && x < 14) << x;
+  auto const dark = [](LdiTree const& tree) {
+    std::size_t count = 0;
+    for (PlacedPixel const& pixel : pixels_of(tree)) count += pixel.level == 0 && pixel.linear[0] < 0.9;
+    return count;
+  };
+  EXPECT_GE(dark(tree_of({torn})), 20U);
+  EXPECT_EQ(dark(tree_of({torn, seen({0.1, 0.7, 0})})), 0U);
+  // Also where what shows it is twice as coarse, or twice as fine.
+  for (double const spacing : {0.5, 2.0}) {
+    Camera const other = Camera::orthographic(48, 48, spacing, spacing, 23.5, 23.5);
+    View const view = plane_view("b", other, toward({0.2, 0.1, 50}, {0.2, 0.1, 0}), Vector3d::UnitZ(), 0.3,
+                                 plain_paint({255, 255, 255}));
+    EXPECT_EQ(dark(tree_of({torn, view})), 0U) << spacing;
+  }
+}
+
+TEST(LdiTree, PixelsOfImagesArePatchesWhereFinerOnesCoverAPart) {
+  // A fine image within a coarse one, from -4 to 4; filters and stamps reach less than two coarse steps.
+  auto const seen = [](int size, double spacing) {
+    double const middle = (size - 1) / 2.0;
+    return plane_view("a", Camera::orthographic(size, size, spacing, spacing, middle, middle),
+                      toward({0, 0, 50}, {0, 0, 0}), Vector3d::UnitZ(), 0.3, plain_paint({50, 90, 130}));
+  };
+  for (double const covered : {0.0, 0.5, 0.9}) {
+    LdiOptions options;
+    options.covered = covered;
+    std::map<LdiKind, std::size_t> counts;
+    std::map<std::pair<double, double>, std::vector<LdiKind>> places;
+    for (PlacedPixel const& pixel : pixels_of(tree_of({seen(20, 1), seen(16, 0.5)}, options))) {
+      if (pixel.level != 0) continue;
+      ++counts[pixel.kind];
+      places[{pixel.at.x(), pixel.at.y()}].push_back(pixel.kind);
+      double const off = pixel.at.head<2>().cwiseAbs().maxCoeff() - 4;
+      if (off < -2) {
+        EXPECT_EQ(pixel.kind, LdiKind::filtered) << off;
+      }
+      if (off > 2) {
+        EXPECT_EQ(pixel.kind, LdiKind::unfiltered) << off;
+      }
+    }
+    EXPECT_GT(counts[LdiKind::filtered], 25U);
+    EXPECT_GT(counts[LdiKind::unfiltered], 200U);
+    // The paper's rule has none; patches have what they fill beside them.
+    EXPECT_EQ(counts[LdiKind::patch] > 0, covered > 0) << covered;
+    for (auto const& [at, kinds] : places)
+      if (std::count(kinds.begin(), kinds.end(), LdiKind::patch) > 0) {
+        EXPECT_LE(kinds.size(), 2U);
+        EXPECT_EQ(std::count(kinds.begin(), kinds.end(), LdiKind::unfiltered), 0);
+      }
+  }
 }
 
 }  // namespace
