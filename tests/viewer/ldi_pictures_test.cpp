@@ -265,6 +265,12 @@ TEST(LdiPictures, OfADamagedFileLackItsDamagedCells) {
     EXPECT_GT(other, 0U);
     EXPECT_GT(same, 10 * other);
   }
+  renderer.options.splats = LdiRenderOptions::Splats::squares;
+  Frame const squares = renderer.render(camera, pose);
+  EXPECT_EQ(renderer.damaged().size(), 1U);
+  std::size_t drawn = 0;
+  for (cv::Vec4b const& pixel : squares.color) drawn += pixel[3] > 0;
+  EXPECT_GT(drawn, squares.color.total() / 2);
   renderer.render(square_view(4), pose);
   EXPECT_TRUE(renderer.damaged().empty());
 }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -108,10 +109,28 @@ Frame LdiRenderer::render(Camera const& camera, Eigen::Isometry3d const& object_
   how.stamp_px = options.stamp_px;
   auto const cells = traverse(*tree_, camera_, object_from_camera_, how);
   stages_["traverse"] = now() - start;
+  if (options.splats == LdiRenderOptions::Splats::squares) return draw_squares(cells);
   start = now();
   draw(cells);
   stages_["draw"] = now() - start;
   return picture();
+}
+
+Frame LdiRenderer::draw_squares(std::vector<TraversedCell> const& cells) {
+  double const start = now();
+  std::vector<CellPart> parts;
+  for (TraversedCell const& at : cells) {
+    parts.push_back({at.cell, LdiKind::unfiltered});
+    if (!at.descended) parts.push_back({at.cell, LdiKind::filtered});
+    parts.push_back({at.cell, LdiKind::patch});
+  }
+  traversed_ = cells;
+  Frame frame;
+  splats_ = squares_.draw(*tree_, parts, camera_, object_from_camera_, frame, context_);
+  damaged_ = squares_.damaged();
+  gaps_ = uncovered_ = frame.color.total() - static_cast<std::size_t>(cv::countNonZero(frame.depth == frame.depth));
+  stages_["draw"] = now() - start;
+  return frame;
 }
 
 Frame LdiRenderer::render_within(double milliseconds, Camera const& camera,

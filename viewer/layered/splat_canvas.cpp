@@ -67,34 +67,39 @@ OutputArea SplatCanvas::area(std::size_t band, cv::Mat1b const& stencil) const {
   return area;
 }
 
-namespace {
-
-/// From grid steps of a face to the screen: rows u, v (times z where perspective) and z.
-SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, Camera const& camera,
-                            Eigen::Isometry3d const& camera_from_object, double near) {
-  int const axis = face / 2, n = tree.options.resolution;
+Eigen::Matrix<double, 3, 4> screen_from_grid(LdiTree const& tree, LdiCell const& cell, int face, Camera const& camera,
+                                             Eigen::Isometry3d const& camera_from_object) {
+  int const axis = face / 2;
   double const step = ldi_step(cell.key.level);
   Eigen::Matrix<double, 3, 4> placed;
   placed.col(0) = step * camera_from_object.linear().col((axis + 1) % 3);
   placed.col(1) = step * camera_from_object.linear().col((axis + 2) % 3);
   placed.col(2) = step * camera_from_object.linear().col(axis);
-  placed.col(3) = camera_from_object * ldi_corner(cell.key, n);
+  placed.col(3) = camera_from_object * ldi_corner(cell.key, tree.options.resolution);
   Eigen::Matrix<double, 3, 4> rows;
-  bool const perspective = camera.is_perspective();
   rows.row(0) = camera.fx() * placed.row(0);
   rows.row(1) = camera.fy() * placed.row(1);
   rows.row(2) = placed.row(2);
-  if (perspective) {
+  if (camera.is_perspective()) {
     rows.row(0) += camera.cx() * placed.row(2);
     rows.row(1) += camera.cy() * placed.row(2);
   } else {
     rows(0, 3) += camera.cx();
     rows(1, 3) += camera.cy();
   }
+  return rows;
+}
+
+namespace {
+
+SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, Camera const& camera,
+                            Eigen::Isometry3d const& camera_from_object, double near) {
+  Eigen::Matrix<double, 3, 4> const rows = screen_from_grid(tree, cell, face, camera, camera_from_object);
+  bool const perspective = camera.is_perspective();
   SplatTransform transform;
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 4; ++k) transform.rows[i][k] = static_cast<float>(rows(i, k));
-  transform.depth_scale = float(n) / 65536;
+  transform.depth_scale = float(tree.options.resolution) / 65536;
   // The grid's axes and the face's own make a right-handed frame: on the screen (y down) it turns the positive way
   // where the axis points away from the camera.
   bool const oriented = tree.options.normals == LdiOptions::Normals::measured;

@@ -19,6 +19,11 @@ struct CellPart {
   LdiKind kind = LdiKind::unfiltered;
 };
 
+/// What becomes of a cell's grid on the screen: from steps along a face's axes (x, y, depth, 1) to u, v (times depth
+/// where perspective) and depth.
+Eigen::Matrix<double, 3, 4> screen_from_grid(LdiTree const& tree, LdiCell const& cell, int face, Camera const& camera,
+                                             Eigen::Isometry3d const& camera_from_object);
+
 /// The layered output buffer of a picture, in bands of rows that are drawn in parallel; what a pixel becomes depends on
 /// the order of what is drawn alone.
 class SplatCanvas {
