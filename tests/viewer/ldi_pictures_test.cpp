@@ -306,5 +306,23 @@ TEST(LdiPictures, OfOneCameraHaveTheSameFiguresHoweverOftenTheyAreTaken) {
   EXPECT_EQ(renderer.splats(), splats);
 }
 
+TEST(LdiPictures, InStepsCountWhatIsUncoveredAtEachStep) {
+  Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
+  LdiOptions options;
+  options.resolution = 8;
+  LdiRenderer renderer(std::make_shared<LdiTree>(tree_of({slanted(square_view(128), pose)}, options)), {});
+  renderer.begin(square_view(128), pose);
+  int steps = 0;
+  for (bool more = true; more; ++steps) {
+    more = renderer.refine();
+    Frame const frame = renderer.picture();
+    std::size_t bare = 0;
+    for (cv::Vec4b const& pixel : frame.color) bare += pixel[3] < 128;
+    EXPECT_EQ(renderer.uncovered(), bare) << steps;
+    EXPECT_LT(bare, frame.color.total() / 10) << steps;
+  }
+  EXPECT_GT(steps, 2);
+}
+
 }  // namespace
 }  // namespace scanview::test

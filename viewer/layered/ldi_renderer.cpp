@@ -147,6 +147,16 @@ Frame LdiRenderer::render_within(double milliseconds, Camera const& camera,
   return picture();
 }
 
+/// Columns of a row in which the picture's canvases may hold something.
+std::pair<int, int> LdiRenderer::touched(int y) const {
+  auto const lasting = lasting_.touched(y);
+  if (!has_passing_) return lasting;
+  auto const passing = passing_.touched(y);
+  if (passing.first == passing.second) return lasting;
+  if (lasting.first == lasting.second) return passing;
+  return {std::min(lasting.first, passing.first), std::max(lasting.second, passing.second)};
+}
+
 /// Marks the gaps where something was drawn around (elsewhere there is nothing to fill them with); returns how many
 /// there are.
 std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
@@ -154,7 +164,7 @@ std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
   auto const least = static_cast<uchar>(std::ceil(255 * options.covered));
   std::atomic<std::size_t> gaps = 0;
   for_each_rows(stencil.rows, [&](int y) {
-    auto const [left, right] = lasting_.touched(y);
+    auto const [left, right] = touched(y);
     std::fill(stencil[y], stencil[y] + stencil.cols, uchar{0});
     std::size_t count = static_cast<std::size_t>(stencil.cols - (right - left));
     for (int x = left; x < right; ++x) {
@@ -170,7 +180,7 @@ std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
 /// Pixels that are covered in part and have no gap around them are within a surface, not on an outline: whole.
 void LdiRenderer::close_seams(cv::Mat1b const& stencil, Frame& frame) {
   for_each_rows(stencil.rows, [&](int y) {
-    auto const [left, right] = lasting_.touched(y);
+    auto const [left, right] = touched(y);
     for (int x = left; x < right; ++x) {
       cv::Vec4b& pixel = frame.color(y, x);
       if (pixel[3] == 255 || stencil(y, x) != 0) continue;

@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/context.h"
@@ -66,6 +67,7 @@ class LdiRenderer : public Renderer {
   std::size_t draw_on(SplatCanvas& canvas, std::vector<CellPart> const& parts, cv::Mat1b const& stencil);
   Frame draw_squares(std::vector<TraversedCell> const& cells);
   void fill_gaps(Frame& frame);
+  std::pair<int, int> touched(int y) const;
   std::size_t find_gaps(Frame const& frame, cv::Mat1b& stencil);
   void close_seams(cv::Mat1b const& stencil, Frame& frame);
   void for_each_rows(int rows, std::function<void(int)> const& work);
