@@ -11,43 +11,24 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/file_descriptor.h"
 
 namespace scanview {
 namespace fs = std::filesystem;
 namespace {
-
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(Descriptor const&) = delete;
-  Descriptor& operator=(Descriptor const&) = delete;
-  int get() const { return fd_; }
-  int close() {
-    int const fd = fd_;
-    fd_ = -1;
-    return ::close(fd);
-  }
-
- private:
-  int fd_;
-};
 
 [[noreturn]] void fail(ErrorCode code, fs::path const& path, std::string const& what) {
   throw Error(code, path, fmt::format("{}: {}", what, std::strerror(errno)));
 }
 
 void sync_folder(fs::path const& folder) {
-  Descriptor const fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  FileDescriptor const fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   // Some file systems cannot sync a folder; the rename is then as durable as they make it.
   if (fd.get() >= 0) (void)::fsync(fd.get());
 }
 
 void write_all(fs::path const& path, std::string_view bytes) {
-  Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  FileDescriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (fd.get() < 0) fail(ErrorCode::io, path, "cannot create");
   while (!bytes.empty()) {
     ssize_t const n = ::write(fd.get(), bytes.data(), bytes.size());
@@ -69,7 +50,7 @@ void require_finite(Json const& json) {
 }  // namespace
 
 std::string read_file(fs::path const& path) {
-  Descriptor const fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  FileDescriptor const fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (fd.get() < 0) fail(ErrorCode::bad_input, path, "cannot open");
   struct stat status {};
   if (::fstat(fd.get(), &status) != 0) fail(ErrorCode::io, path, "cannot stat");

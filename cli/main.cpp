@@ -101,8 +101,9 @@ int main(int argc, char** argv) {
   app.add_option("--set", session.settings, "STAGE.NAME=VALUE: any option of a stage")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  for (AddVerb const add : {add_acquire, add_calibrate, add_import, add_register, add_mesh, add_view, add_visibility,
-                            add_walkthrough, add_render, add_evaluate, add_synth, add_run, add_export, add_info})
+  for (AddVerb const add :
+       {add_acquire, add_calibrate, add_import, add_register, add_mesh, add_view, add_visibility, add_walkthrough,
+        add_ldi, add_render, add_evaluate, add_synth, add_run, add_export, add_info})
     add(app, session);
   try {
     app.parse(argc, argv);

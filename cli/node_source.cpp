@@ -98,17 +98,13 @@ class SetScene final : public NodeSource {
   SetScene(fs::path const& folder, NodeSourceOptions const& options, Context& context)
       : set_(read_scan_set(folder, context)) {
     if (!set_.has_poses()) throw Error(ErrorCode::bad_input, folder, "views without poses: register the set first");
-    int every = 0;
-    char end = 0;
-    if (!options.hold_out.empty() &&
-        (std::sscanf(options.hold_out.c_str(), "every:%d%c", &every, &end) != 1 || every < 2))
-      throw Error(ErrorCode::usage, {}, "--hold-out " + options.hold_out + ": expected every:N, N at least 2");
+    std::size_t const every = held_out_step(options.hold_out);
     Eigen::Vector3d up = Eigen::Vector3d::Zero();
     for (std::size_t v = 0; v < set_.views.size(); ++v) {
       if (!set_.views[v].image.camera.is_perspective())
         throw Error(ErrorCode::bad_input, folder, "orthographic views cannot be nodes");
       up -= set_.views[v].object_from_camera->linear().col(1);
-      (every > 0 && v % std::size_t(every) == std::size_t(every) - 1 ? held_out_ : nodes_).push_back(v);
+      (every > 0 && v % every == every - 1 ? held_out_ : nodes_).push_back(v);
     }
     up_ = up.norm() > 0 ? Eigen::Vector3d(up.normalized()) : Eigen::Vector3d(0, 1, 0);
   }
@@ -168,6 +164,14 @@ class PanoramaScene final : public NodeSource {
 };
 
 }  // namespace
+
+std::size_t held_out_step(std::string const& hold_out) {
+  int every = 0;
+  char end = 0;
+  if (!hold_out.empty() && (std::sscanf(hold_out.c_str(), "every:%d%c", &every, &end) != 1 || every < 2))
+    throw Error(ErrorCode::usage, {}, "--hold-out " + hold_out + ": expected every:N, N at least 2");
+  return static_cast<std::size_t>(every);
+}
 
 std::vector<Eigen::Vector3d> read_node_positions(fs::path const& file) {
   Json const json = read_json(file);

@@ -52,6 +52,9 @@ enum class Places { chosen, none };
 std::unique_ptr<NodeSource> open_node_source(std::string const& scene, NodeSourceOptions const& options, Places places,
                                              Context& context);
 
+/// N of "every:N", at least 2: each Nth view is held out; 0 where nothing is said. Throws Error{usage}.
+std::size_t held_out_step(std::string const& hold_out);
+
 /// Positions a person chose: a JSON list of [x, y, z], or {"nodes": [{"name": "...", "position": [x, y, z]}]}. Throws
 /// Error{bad_input}.
 std::vector<Eigen::Vector3d> read_node_positions(std::filesystem::path const& file);

@@ -21,8 +21,8 @@ struct Session {
   bool quiet = false;
   std::vector<std::string> settings;  ///< --set KEY=VALUE, as given
   Json report = Json::object();       ///< the verb's keys
-  int exit_code = 0;                  ///< 0, or 6 where part of the views failed
-  std::function<void()> work;         ///< set by the verb that was named
+  int exit_code = 0;  ///< 0; where what was done is not whole: 6 (part of the views failed), 3 (of damaged input)
+  std::function<void()> work;  ///< set by the verb that was named
   std::string verb;
 };
 
@@ -42,6 +42,7 @@ void add_run(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);
 void add_visibility(CLI::App& app, Session& session);
 void add_walkthrough(CLI::App& app, Session& session);
+void add_ldi(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 
 /// One option of a stage that --set can reach, as "STAGE.NAME".

@@ -2,18 +2,22 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
 #include <memory>
 
 #include "acquire/archive.h"
 #include "acquire/capture.h"
 #include "acquire/import.h"
+#include "acquire/json_vector.h"
 #include "acquire/rgbd_manifest.h"
 #include "acquire/scan_set_file.h"
 #include "base/error.h"
 #include "base/image_file.h"
 #include "base/ply.h"
+#include "cli/ldi_figures.h"
 #include "cli/session.h"
 #include "mesh/triangle_mesh.h"
+#include "viewer/layered/ldi_file.h"
 #include "viewer/walkthrough/walkthrough_file.h"
 
 namespace scanview {
@@ -173,6 +177,36 @@ Json info_walkthrough(fs::path const& folder) {
           {"nodes", nodes}};
 }
 
+Json info_ldi(fs::path const& path) {
+  LdiTree const tree = read_ldi(path);
+  Json info = {{"kind", "LDI tree"},
+               {"unit", to_string(tree.unit)},
+               {"resolution", tree.options.resolution},
+               {"coarseness", tree.options.coarseness},
+               {"center", vector_to_json(tree.center)},
+               {"radius", tree.radius},
+               {"file_bytes", fs::file_size(path)},
+               {"input_pixels", tree.input_pixels}};
+  Json size = ldi_size(tree);
+  size.erase("levels");
+  info.update(size);
+  std::map<int, std::pair<std::size_t, std::size_t>> levels;  // cells, pixels
+  for (LdiCell const& cell : tree.cells) {
+    levels[cell.key.level].first += 1;
+    levels[cell.key.level].second += cell.pixels;
+  }
+  info["levels"] = Json::array();
+  for (auto const& [level, counts] : levels)
+    info["levels"].push_back({{"step", ldi_step(level)}, {"cells", counts.first}, {"pixels", counts.second}});
+  info["views"] = Json::array();
+  for (View const& view : tree.views)
+    info["views"].push_back({{"name", view.name},
+                             {"width", view.image.camera.width()},
+                             {"height", view.image.camera.height()},
+                             {"model", view.image.camera.is_perspective() ? "perspective" : "orthographic"}});
+  return info;
+}
+
 Json info(fs::path const& path, Context& context) {
   if (!fs::exists(path)) throw Error(ErrorCode::bad_input, path, "does not exist");
   if (fs::is_directory(path)) {
@@ -188,6 +222,7 @@ Json info(fs::path const& path, Context& context) {
   std::string const name = path.filename().string();
   auto const ends = [&](std::string_view ending) { return name.ends_with(ending); };
   if (name == "scanset.json") return info_scan_set(path.parent_path(), context);
+  if (ends(".ldi") || is_ldi(path)) return info_ldi(path);
   if (ends(".ply")) return info_ply(path);
   if (ends(".obj") || ends(".obj.gz") || ends(".ply.gz")) return info_mesh(path);
   if (ends(".exr")) return info_exr(path);
@@ -226,7 +261,8 @@ void print(Json const& json, std::string const& indent) {
 void add_info(CLI::App& app, Session& session) {
   auto path = std::make_shared<fs::path>();
   CLI::App* verb = app.add_subcommand("info", "What is in a file or folder");
-  verb->add_option("path", *path, "Scan set, capture, frames, mesh, picture, range image, record, archive ...")
+  verb->add_option("path", *path,
+                   "Scan set, LDI tree, capture, frames, mesh, picture, range image, record, archive ...")
       ->required();
   verb->callback([path, &session] {
     session.verb = "info";

@@ -1,18 +1,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
 #include <memory>
 
 #include "acquire/scan_set_file.h"
-#include "base/animated_png.h"
 #include "base/error.h"
-#include "base/image_file.h"
+#include "base/median.h"
+#include "cli/frame_cameras.h"
 #include "cli/stages.h"
 #include "viewer/blend/composite_renderer.h"
 #include "viewer/blend/supersampling.h"
-#include "viewer/select/camera_path.h"
 #include "viewer/view_based/view_based_renderer.h"
 
 namespace scanview {
@@ -26,23 +24,14 @@ struct Companion {
 };
 
 struct RenderArguments {
-  fs::path set, output, path;
-  int orbit = 0;
-  bool halfway = false, film = false;
+  fs::path set, output;
+  FrameCameras cameras;
+  bool film = false;
   std::vector<std::string> with;
-  std::string like, size = "800x600", back_end = "cpu";
+  std::string back_end = "cpu";
   int supersampling = 2;
   ViewBasedOptions options;
 };
-
-std::pair<int, int> parse_size(std::string const& text) {
-  int width = 0, height = 0;
-  char end = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &end) != 2 || width < 1 || height < 1 || width > 16384 ||
-      height > 16384)
-    throw Error(ErrorCode::usage, {}, fmt::format("--size {}: expected WIDTHxHEIGHT, 1 to 16384 each", text));
-  return {width, height};
-}
 
 /// "SET", or "SET@FILE" with a JSON list of 16 numbers: scene_from_object, row by row, the scene being the first set's
 /// object coordinates.
@@ -56,21 +45,10 @@ Companion read_companion(std::string const& text, Context& context) {
   return companion;
 }
 
-std::vector<PathCamera> cameras(RenderArguments const& arguments, ViewLibrary const& library) {
-  ScanSet const& set = library.set();
-  auto const [width, height] = parse_size(arguments.size);
-  // The library has no depths to tell the object's size from.
-  OrbitFrame const frame = orbit_frame(set, library.radius());
-  if (arguments.orbit > 0) return orbit_path(set, frame, arguments.orbit, width, height);
-  if (arguments.halfway) return halfway_path(set, frame, width, height);
-  if (!arguments.path.empty()) return read_camera_path(arguments.path, set, frame, width, height);
-  return {camera_like(set, arguments.like, width, height)};
-}
-
 void render(RenderArguments const& arguments, Session& session) {
   Context& context = session.context;
   auto const library = ViewLibrary::open(arguments.set, context);
-  auto const path = cameras(arguments, *library);
+  auto const path = frame_cameras(arguments.cameras, library->set(), library->radius());
   auto const gl = arguments.back_end == "gl" ? make_offscreen_context() : nullptr;
   auto const make = [&](std::shared_ptr<ViewLibrary> const& of) {
     return gl ? make_gl_renderer(*gl, of, arguments.options)
@@ -88,35 +66,29 @@ void render(RenderArguments const& arguments, Session& session) {
   }
   CompositeRenderer scene(std::move(parts));
   SupersamplingRenderer smooth(scene, arguments.supersampling);
-  std::error_code error;
-  fs::create_directories(arguments.output, error);
-  if (error) throw Error(ErrorCode::io, arguments.output, "cannot create: " + error.message());
+  constexpr int kFilmMilliseconds = 80;
+  FrameFolder folder(arguments.output, arguments.film ? FrameFolder::Film::film : FrameFolder::Film::none,
+                     kFilmMilliseconds);
 
   session.report["frames"] = Json::array();
   session.report["back_end"] = arguments.back_end;
   std::vector<double> times;
-  std::vector<std::string> pictures;
   for (std::size_t i = 0; i < path.size(); ++i) {
     context.check_cancelled();
     auto const start = std::chrono::steady_clock::now();
     Frame const frame = smooth.render(path[i].camera, path[i].object_from_camera);
     times.push_back(1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    std::string const file = path[i].name + ".png";
-    std::string png = encode_png(frame.color);
-    write_file(arguments.output / file, png);
-    if (arguments.film) pictures.push_back(std::move(png));
+    std::string const file = folder.write(path[i].name, frame.color);
     write_depth_exr(arguments.output / (path[i].name + ".exr"), frame.depth);
     session.report["frames"].push_back({{"file", file}, {"milliseconds", times.back()}, {"stages", timed.stages()}});
     context.progress("render", i + 1, path.size());
   }
-  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
-  constexpr int kFilmMilliseconds = 80;
-  if (arguments.film) write_file(arguments.output / "film.png", animated_png(pictures, kFilmMilliseconds));
+  folder.finish();
   for (auto const& one : libraries) {
     for (auto const& failure : one->failures()) context.warn(failure);
     if (!one->failures().empty()) session.exit_code = static_cast<int>(ErrorCode::partial);
   }
-  session.report["fps_median"] = times.empty() ? 0 : 1e3 / times[times.size() / 2];
+  session.report["fps_median"] = times.empty() ? 0 : 1e3 / median(times);
 }
 
 }  // namespace
@@ -127,13 +99,7 @@ void add_render(CLI::App& app, Session& session) {
       app.add_subcommand("render", "Pictures (PNG with alpha) and depths (EXR) from any side; needs no display");
   verb->add_option("set", arguments->set, "The scan set, meshed")->required();
   verb->add_option("-o,--output", arguments->output, "Folder of the pictures")->required();
-  CLI::Option_group* which = verb->add_option_group("cameras");
-  which->add_option("--orbit", arguments->orbit, "A full turn in so many pictures")->check(CLI::Range(1, 100000));
-  which->add_flag("--halfway", arguments->halfway, "From halfway between consecutive views");
-  which->add_option("--path", arguments->path, "Cameras of a path file");
-  which->add_option("--like", arguments->like, "From the camera of this view");
-  which->require_option(1);
-  verb->add_option("--size", arguments->size, "WIDTHxHEIGHT");
+  add_camera_options(verb, arguments->cameras);
   verb->add_option(
       "--with", arguments->with,
       "Another set in the same scene: SET, or SET@FILE with its place (a JSON list of 16 numbers, row by row, "

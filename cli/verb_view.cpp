@@ -12,10 +12,12 @@
 #include "acquire/scan_set_file.h"
 #include "base/error.h"
 #include "cli/stages.h"
+#include "viewer/layered/ldi_file.h"
 #include "viewer/visibility/visibility_file.h"
 #include "viewer/walkthrough/walkthrough_file.h"
 #include "viewer/window/commands.h"
 #include "viewer/window/model_window.h"
+#include "viewer/window/tree_window.h"
 #include "viewer/window/view_window.h"
 #include "viewer/window/walk_window.h"
 
@@ -94,11 +96,26 @@ void view_walkthrough_folder(fs::path const& folder, WalkWindowOptions options, 
   std::cout << fmt::format("uncovered {:.3f} %, {:.0f} triangles a frame\n", 100 * result.uncovered, result.triangles);
 }
 
+void view_tree_file(fs::path const& path, TreeWindowOptions options, Session& session) {
+  options.validate();
+  options.title = "scanview " + path.string();
+  auto const tree = std::make_shared<LdiTree const>(read_ldi(path));
+  TreeWindowResult const result = view_ldi_tree(tree, options, session.context);
+  if (!result.failures.empty()) session.exit_code = static_cast<int>(ErrorCode::bad_input);
+  if (!result.times) return;
+  report_times(*result.times, options.frames, session);
+  session.report["cells_traversed"] = result.cells;
+  session.report["splats"] = result.splats;
+  session.report["uncovered"] = result.uncovered;
+  std::cout << fmt::format("{:.0f} cells, {:.2f} million splats a frame, uncovered {:.3f} %\n", result.cells,
+                           1e-6 * result.splats, 100 * result.uncovered);
+}
+
 /// What `view` was given, which some options are for.
-enum class Viewed { set, model, walkthrough };
+enum class Viewed { set, model, walkthrough, tree };
 
 Viewed kind_of(fs::path const& path) {
-  if (fs::is_regular_file(path)) return Viewed::model;
+  if (fs::is_regular_file(path)) return is_ldi(path) ? Viewed::tree : Viewed::model;
   return is_walkthrough(path) ? Viewed::walkthrough : Viewed::set;
 }
 
@@ -113,6 +130,7 @@ void add_view(CLI::App& app, Session& session) {
   struct Arguments {
     fs::path path, visibility, cameras;
     WindowOptions options;
+    TreeWindowOptions of_tree;
     std::string back_end = "auto", up = "y", policy = to_string(WalkthroughOptions().policy);
   };
   static std::map<std::string, UpAxis> const kAxes = {{"x", UpAxis::x},        {"y", UpAxis::y},
@@ -125,8 +143,9 @@ void add_view(CLI::App& app, Session& session) {
   }();
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("view", "A window to turn the object in, or to walk through a scene");
-  verb->add_option("path", arguments->path,
-                   "The scan set, meshed; or a file with a polygon model; or the folder of a walkthrough")
+  verb->add_option(
+          "path", arguments->path,
+          "The scan set, meshed; or a file with a polygon model; or the folder of a walkthrough; or an LDI tree")
       ->required();
   verb->add_option("--width", arguments->options.width, "Of the window, in pixels");
   verb->add_option("--height", arguments->options.height, "Of the window, in pixels");
@@ -148,27 +167,39 @@ void add_view(CLI::App& app, Session& session) {
                        "How nodes are merged at first: layering, binary, weighted or positional")
           ->check(CLI::IsMember(kPolicies))};
   for (CLI::Option* const option : of_walkthroughs) option->group("Of a walkthrough");
+  std::vector<CLI::Option*> const of_trees = {
+      verb->add_option("--stamp", arguments->of_tree.rendering.stamp_px,
+                       "How many pixels a sample may be wide at first, 0.25 to 64"),
+      verb->add_option("--milliseconds", arguments->of_tree.milliseconds,
+                       "For which a frame is refined while the eye moves; 0: always to the end")};
+  for (CLI::Option* const option : of_trees) option->group("Of an LDI tree");
   verb->footer("A set:\n" + window_help() + "\n\nA model:\n" + model_window_help() + "\n\nA walkthrough:\n" +
-               walk_window_help());
-  verb->callback([arguments, of_models, of_walkthroughs, &session] {
+               walk_window_help() + "\n\nAn LDI tree:\n" + tree_window_help());
+  verb->callback([arguments, of_models, of_walkthroughs, of_trees, &session] {
     session.verb = "view";
-    session.work = [arguments, of_models, of_walkthroughs, &session] {
+    session.work = [arguments, of_models, of_walkthroughs, of_trees, &session] {
       WindowOptions& options = arguments->options;
       Viewed const viewed = kind_of(arguments->path);
       if (viewed != Viewed::model) refuse_given(of_models, " is for a polygon model");
       if (viewed != Viewed::walkthrough) refuse_given(of_walkthroughs, " is for a walkthrough");
+      if (viewed != Viewed::tree) refuse_given(of_trees, " is for an LDI tree");
       if (viewed == Viewed::set) {
         if (arguments->back_end != "auto") options.back_end = arguments->back_end == "cpu" ? BackEnd::cpu : BackEnd::gl;
         view_set(arguments->path, options, session);
         return;
       }
       if (arguments->back_end == "gl")
-        throw Error(ErrorCode::usage, {}, "--back-end: models and walkthroughs are drawn by the processor");
+        throw Error(ErrorCode::usage, {}, "--back-end: models, walkthroughs and LDI trees are drawn by the processor");
       if (viewed == Viewed::walkthrough) {
         WalkWindowOptions of_walkthrough;
         static_cast<BasicWindowOptions&>(of_walkthrough) = options;
         of_walkthrough.rendering.policy = kPolicies.at(arguments->policy);
         view_walkthrough_folder(arguments->path, of_walkthrough, session);
+        return;
+      }
+      if (viewed == Viewed::tree) {
+        static_cast<BasicWindowOptions&>(arguments->of_tree) = options;
+        view_tree_file(arguments->path, arguments->of_tree, session);
         return;
       }
       ModelWindowOptions of_model;

@@ -8,10 +8,9 @@
 #include <memory>
 
 #include "acquire/scan_set_file.h"
-#include "base/animated_png.h"
 #include "base/error.h"
-#include "base/image_file.h"
 #include "base/median.h"
+#include "cli/frame_cameras.h"
 #include "cli/session.h"
 #include "cli/walkthrough_build.h"
 #include "cli/walkthrough_report.h"
@@ -92,12 +91,11 @@ void render_walk(WalkthroughArguments const& arguments, Session& session) {
   options.gaps = arguments.gaps == "interpolated" ? VisibilityGaps::interpolated : VisibilityGaps::background;
   WalkthroughRenderer renderer(library, options, context.threads);
   auto const path = walk(arguments, read_walkthrough(arguments.folder));
-  std::error_code error;
-  fs::create_directories(arguments.output, error);
-  if (error) throw Error(ErrorCode::io, arguments.output, "cannot create: " + error.message());
+  constexpr int kFilmMilliseconds = 50;
+  FrameFolder folder(arguments.output, arguments.film ? FrameFolder::Film::film : FrameFolder::Film::none,
+                     kFilmMilliseconds);
   session.report["frames"] = Json::array();
   std::vector<double> times;
-  std::vector<std::string> film;
   double uncovered = 0;
   for (std::size_t i = 0; i < path.size(); ++i) {
     context.check_cancelled();
@@ -108,9 +106,7 @@ void render_walk(WalkthroughArguments const& arguments, Session& session) {
     times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
     double const share = double(renderer.uncovered()) / double(drawn.color.total());
     uncovered += share / double(path.size());
-    std::string const file = path[i].name + ".png", png = encode_png(box_filtered(drawn, arguments.samples).color);
-    write_file(arguments.output / file, png);
-    if (arguments.film) film.push_back(png);
+    std::string const file = folder.write(path[i].name, box_filtered(drawn, arguments.samples).color);
     session.report["frames"].push_back({{"file", file},
                                         {"milliseconds", times.back()},
                                         {"stages", renderer.stages()},
@@ -118,8 +114,7 @@ void render_walk(WalkthroughArguments const& arguments, Session& session) {
                                         {"uncovered", share}});
     context.progress("render", i + 1, path.size());
   }
-  constexpr int kFilmMilliseconds = 50;
-  if (arguments.film) write_file(arguments.output / "film.png", animated_png(film, kFilmMilliseconds));
+  folder.finish();
   note_failures(*library, session);
   session.report["uncovered"] = uncovered;
   session.report["fps_median"] = times.empty() ? 0 : 1e3 / median(times);

@@ -104,6 +104,23 @@ TEST(Halfway, LiesBetweenNeighboursAndClosesTheCircle) {
   }
 }
 
+TEST(PathThroughViews, PassesEveryViewInEvenSteps) {
+  auto const scene = turntable(5, 20);
+  auto const path = path_through_views(scene.set, orbit_frame(scene.set), 9, 64, 48);
+  ASSERT_EQ(path.size(), 9U);
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_TRUE(path[2 * i].object_from_camera.isApprox(*scene.set.views[i].object_from_camera, 1e-9));
+  for (auto const& p : path) EXPECT_NEAR((p.object_from_camera.translation() - scene.set.center).norm(), 4, 1e-9);
+  EXPECT_EQ(path[0].camera, scene.set.views[0].image.camera);
+  // In a room: straight on.
+  OrbitFrame room = orbit_frame(scene.set);
+  room.radius = 10;
+  auto const straight = path_through_views(scene.set, room, 9, 64, 48);
+  Vector3d const middle = (scene.set.views[0].eye() + scene.set.views[1].eye()) / 2;
+  EXPECT_LT((straight[1].object_from_camera.translation() - middle).norm(), 1e-9);
+  EXPECT_EQ(path_through_views(scene.set, room, 1, 64, 48).size(), 1U);
+}
+
 TEST(CameraLike, ShowsTheWholeViewUndistorted) {
   auto const scene = turntable(3, 0);
   auto const same = camera_like(scene.set, "001", 64, 48);

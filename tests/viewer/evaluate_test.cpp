@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -85,7 +86,7 @@ TEST(HeldOut, AViewComesBackFromTheOthersAndPeersAreComparedOnTheSamePixels) {
   Context context;
   auto const library = std::make_shared<ViewLibrary>(scene.set, scene.meshes);
   auto contenders = make_contenders(scene.set, library, {}, context);
-  ASSERT_GE(contenders.size(), 4U);
+  ASSERT_GE(contenders.size(), 6U);
   auto const all = evaluate_held_out(contenders, scene.set, {0, 3}, HoldOut::each, context);
   ASSERT_EQ(all.size(), contenders.size());
   for (auto const& one : all) ASSERT_EQ(one.views.size(), 2U) << one.name;
@@ -129,6 +130,35 @@ TEST(HeldOut, ViewsHeldOutTogetherSeeNoneOfTheOthers) {
   // A quarter of a turn away: the lens that the caps of both share, at their rims.
   EXPECT_GT(together[0].views[0].coverage, 0.1);
   EXPECT_LT(together[0].views[0].coverage, 0.4);
+}
+
+TEST(HeldOut, ALayeredTreeIsThatOfTheViewsThatAreLeft) {
+  // Orthographic views: a tree takes them, a walkthrough does not.
+  auto scene =
+      scan(sphere(Vector3d::Zero(), 1), Camera::orthographic(50, 40, 0.06, 0.06, 24.5, 19.5), ring(4, 15), 0.3, 0.02);
+  Context context;
+  auto const tree_of = [&](std::vector<Contender>& contenders) -> HeldOutRenderer& {
+    EXPECT_TRUE(
+        std::none_of(contenders.begin(), contenders.end(), [](auto& one) { return one.name == "walkthrough"; }));
+    auto const at =
+        std::find_if(contenders.begin(), contenders.end(), [](Contender const& one) { return one.name == "ldi"; });
+    return *at->renderer;
+  };
+  auto const library = [&] { return std::make_shared<ViewLibrary>(scene.set, scene.meshes); };
+  auto all = make_contenders(scene.set, library(), {}, context);
+  View const held_out = scene.set.views[1];
+  auto const draw = [&](HeldOutRenderer& tree) {
+    return tree.render(held_out.image.camera, *held_out.object_from_camera).color;
+  };
+  cv::Mat4b const with = draw(tree_of(all));
+  tree_of(all).exclude({1});
+  cv::Mat4b const without = draw(tree_of(all));
+  EXPECT_GT(cv::norm(with, without, cv::NORM_INF), 0);
+  scene.set.views.erase(scene.set.views.begin() + 1);
+  scene.meshes.erase(scene.meshes.begin() + 1);
+  auto left = make_contenders(scene.set, library(), {}, context);
+  EXPECT_EQ(cv::norm(without, draw(tree_of(left)), cv::NORM_INF), 0);
+  EXPECT_THROW(tree_of(left).exclude({0, 1, 2}), Error);
 }
 
 TEST(HeldOut, TheOnlyViewCannotBeHeldOut) {

@@ -6,6 +6,8 @@
 #include "base/median.h"
 #include "viewer/evaluate/fused_mesh.h"
 #include "viewer/evaluate/lumigraph_renderer.h"
+#include "viewer/layered/ldi_builder.h"
+#include "viewer/layered/ldi_renderer.h"
 #include "viewer/walkthrough/view_node.h"
 #include "viewer/walkthrough/walkthrough_renderer.h"
 
@@ -90,6 +92,39 @@ class Walkthrough final : public HeldOutRenderer {
   std::unique_ptr<WalkthroughRenderer> renderer_;
 };
 
+/// Its tree is built anew without the views that are held out: what images add cannot be taken out again.
+class LayeredTree final : public HeldOutRenderer {
+ public:
+  LayeredTree(ScanSet const& set, double threshold, int threads) : views_(set.views), unit_(set.unit) {
+    options_.depth_error = threshold;
+    context_.threads = threads;
+  }
+  void exclude(std::vector<std::size_t> const& views) override {
+    if (renderer_ && views == excluded_) return;
+    std::vector<View> used;
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      if (std::find(views.begin(), views.end(), v) == views.end()) used.push_back(views_[v]);
+    renderer_.reset();  // two trees at once would need twice the memory
+    LdiBuilder builder(options_);
+    builder.add(used, context_);
+    auto tree = std::make_shared<LdiTree const>(builder.build(unit_, context_));
+    renderer_ = std::make_unique<LdiRenderer>(std::move(tree), LdiRenderOptions(), context_.threads);
+    excluded_ = views;
+  }
+  Frame render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) override {
+    if (!renderer_) exclude({});
+    return renderer_->render(camera, object_from_camera);
+  }
+
+ private:
+  std::vector<View> views_;
+  Unit unit_;
+  LdiOptions options_;
+  Context context_;
+  std::vector<std::size_t> excluded_;
+  std::unique_ptr<LdiRenderer> renderer_;
+};
+
 bool has_orthographic_views(ScanSet const& set) {
   return std::any_of(set.views.begin(), set.views.end(),
                      [](View const& view) { return !view.image.camera.is_perspective(); });
@@ -112,8 +147,9 @@ std::vector<Contender> make_contenders(ScanSet const& set, std::shared_ptr<ViewL
   LumigraphOptions lumigraph;
   lumigraph.threshold = options.threshold;
   all.push_back({"lumigraph", "unstructured lumigraph (k = 4)", make_lumigraph_renderer(library, lumigraph)});
+  double const threshold = options.threshold >= 0 ? options.threshold : default_threshold(*library);
+  all.push_back({"ldi", "LDI tree", std::make_unique<LayeredTree>(set, threshold, context.threads)});
   if (!has_orthographic_views(set)) {
-    double const threshold = options.threshold >= 0 ? options.threshold : default_threshold(*library);
     all.push_back({"walkthrough", "walkthrough, each view a node",
                    std::make_unique<Walkthrough>(*library, threshold, context.threads)});
   }

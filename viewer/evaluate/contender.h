@@ -24,9 +24,10 @@ struct Contender {
 };
 
 /// Ours with the CPU rasteriser (first: the one all others are compared with), the nearest view alone, a z-buffered
-/// collage of the views around the eye, the unstructured lumigraph, of
-/// perspective views the walkthrough (each view a node), and where the program was built with Open3D
-/// (SCANVIEW_OPEN3D) a fused mesh with vertex colours. `set` has its images (the fused mesh is made of depths).
+/// collage of the views around the eye, the unstructured lumigraph, the LDI tree (built by exclude(), or by the first
+/// frame where nothing is excluded), of perspective views the walkthrough (each view a node), and where the program was
+/// built with Open3D (SCANVIEW_OPEN3D) a fused mesh with vertex colours. `set` has its images (trees and the fused mesh
+/// are made of depths).
 std::vector<Contender> make_contenders(ScanSet const& set, std::shared_ptr<ViewLibrary> library,
                                        ViewBasedOptions const& options, Context& context);
 

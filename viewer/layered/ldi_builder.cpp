@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "viewer/layered/ldi_filter.h"
+#include "viewer/layered/ldi_key_order.h"
 
 namespace scanview {
 namespace {
@@ -14,6 +15,8 @@ namespace {
 constexpr double kFull = 256;  // weight of a grid point that is covered once (kLdiFullWeight)
 /// A stamp of a surface that is seen from a grazing angle reaches no further than so many grid points.
 constexpr float kFarthest = 48;
+/// More than a tangent plane, of slopes up to 1, rises over that reach.
+constexpr std::int32_t kDeep = 128;
 
 std::int64_t floor_to_int(double value) { return static_cast<std::int64_t>(std::floor(value)); }
 
@@ -22,7 +25,10 @@ std::int64_t floor_to_int(double value) { return static_cast<std::int64_t>(std::
 /// A stamp above one cell, in grid steps from its corner along the face's axes.
 struct LdiBuilder::Landing {
   LdiCellKey cell;
-  float x, y, depth;
+  float x, y;
+  /// Depth is bin + (depth − kDeep): so that cells above each other agree to the bit on whose bin it is in.
+  std::int32_t bin;
+  float depth;
   /// From grid points to stamps: (a, b) = inverse (X − x, Y − y), in which the kernel is (1 − |a|)(1 − |b|); its reach
   /// along x and y.
   float a_x, a_y, b_x, b_y, reach_x, reach_y;
@@ -79,8 +85,15 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
 
   // Grid points are in the middle of steps.
   Eigen::Vector3d const at = (stamp.center - ldi_origin()) / step;
+  if (!(at.cwiseAbs().maxCoeff() <= double(kLdiFarthestGridPoint)))
+    throw Error(ErrorCode::bad_input, {},
+                "pixels are too small for how far they are from the origin: move the scene there, or give a smallest "
+                "feature");
   double const x = at[b] - 0.5, y = at[c] - 0.5, depth = at[axis];
-  float const rise = std::abs(landing.slope_x) * landing.reach_x + std::abs(landing.slope_y) * landing.reach_y;
+  float rise = std::abs(landing.slope_x) * landing.reach_x + std::abs(landing.slope_y) * landing.reach_y;
+  if (rise > 0) rise += 1e-3F;  // for what is rounded
+  std::int64_t const bin = floor_to_int(depth);
+  landing.depth = std::min(static_cast<float>(depth - double(bin)), 1 - 0x1p-16F) + float(kDeep);
   auto const low = [&](double value, float reach) {
     return floor_to_int(value - double(reach)) + 1;  // the first grid point with a weight, or one before it
   };
@@ -100,7 +113,7 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
         landing.cell.index[static_cast<std::size_t>(c)] = j;
         landing.x = static_cast<float>(x - double(i * n));
         landing.y = static_cast<float>(y - double(j * n));
-        landing.depth = static_cast<float>(depth - double(z * n));
+        landing.bin = static_cast<std::int32_t>(bin - z * n);
         landings.push_back(landing);
       }
 }
@@ -127,12 +140,13 @@ bool splat(Landing const& landing, LdiSums& sums) {
           std::max(landing.share < 1 ? 1U : 0U, static_cast<std::uint32_t>(std::lround(exact)));
       if (weight == 0) continue;
       float const depth = landing.depth + landing.slope_x * dx + landing.slope_y * dy;
-      if (!(depth >= 0 && depth < float(n))) continue;
-      std::uint32_t const bin = static_cast<std::uint32_t>(depth);
+      std::int32_t const whole = static_cast<std::int32_t>(depth), in_cell = landing.bin + whole - kDeep;
+      if (in_cell < 0 || in_cell >= n) continue;
+      std::uint32_t const bin = static_cast<std::uint32_t>(in_cell);
       LdiSum& sum = sums.at(landing.face, x, y, bin);
       if (sum.weight > LdiSums::kMostWeight - weight) return false;
       sum.weight += weight;
-      sum.depth += weight * static_cast<std::uint32_t>((depth - float(bin)) * 256);
+      sum.depth += weight * static_cast<std::uint32_t>((depth - float(whole)) * 256);
       sum.red += std::uint64_t{weight} * landing.red;
       sum.green += std::uint64_t{weight} * landing.green;
       sum.blue += std::uint64_t{weight} * landing.blue;
@@ -236,6 +250,9 @@ void LdiBuilder::add_batch(std::vector<View> const& views, std::size_t begin, st
       for (std::uint32_t k = part.begin; k < part.end; ++k)
         if (!splat(part.band->landings[part.band->order[k]], *sums)) overflow = true;
   });
+  // Tangent planes reach fewer cells than the boxes about stamps.
+  for (auto const& [key, list] : parts)
+    if (auto const it = cells_.find(key); it->second->count() == 0) cells_.erase(it);
   if (overflow) throw Error(ErrorCode::bad_input, {}, "more pixels fall on one place of the tree than can be summed");
 }
 
@@ -278,12 +295,20 @@ void LdiBuilder::resume(LdiTree const& tree, LdiSumCells&& sums) {
 LdiTree LdiBuilder::build(Unit unit, Context& context) const {
   if (cells_.empty()) throw Error(ErrorCode::bad_input, {}, "no pixel of the reference images has a depth");
   LdiTree tree = filter_upwards(cells_, options_, context);
+  if (tree.cells.empty())
+    throw Error(ErrorCode::bad_input, {},
+                "the reference images' pixels cover next to nothing of the grid: give a smaller smallest feature");
   tree.unit = unit;
   tree.views = views_;
   std::sort(tree.views.begin(), tree.views.end(), [](View const& a, View const& b) {
     auto const flat = [](View const& view) {
       Eigen::Matrix4d const m = view.object_from_camera->matrix();
-      return std::vector<double>(m.data(), m.data() + m.size());
+      Camera const& camera = view.image.camera;
+      std::vector<double> all(m.data(), m.data() + m.size());
+      all.insert(all.end(),
+                 {view.gain[0], view.gain[1], view.gain[2], double(camera.is_perspective()), double(camera.width()),
+                  double(camera.height()), camera.fx(), camera.fy(), camera.cx(), camera.cy()});
+      return all;
     };
     return a.name != b.name ? a.name < b.name : flat(a) < flat(b);
   });

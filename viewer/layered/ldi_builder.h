@@ -26,9 +26,10 @@ class LdiBuilder {
   explicit LdiBuilder(LdiOptions const& options);
 
   /// Views must have poses and images; throws Error{bad_input} that names the view otherwise, or where more was
-  /// splatted to one place than sums can hold.
+  /// splatted to one place than sums can hold, or pixels are farther from the origin than 2^44 of their size.
   void add(std::vector<View> const& views, Context& context);
-  /// All that has been added, filtered upwards. Throws Error{bad_input} where no pixel had a depth.
+  /// All that has been added, filtered upwards. Throws Error{bad_input} where no pixel had a depth, or all of
+  /// them together cover nothing (far smaller than the smallest feature).
   LdiTree build(Unit unit, Context& context) const;
 
   LdiOptions const& options() const { return options_; }

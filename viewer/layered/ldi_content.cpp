@@ -140,14 +140,14 @@ LdiTree tree_of(std::unordered_map<LdiCellKey, LdiContent, LdiCellKeyHash>&& con
   for (LdiCell& cell : tree.cells) {
     LdiContent& content = contents.at(cell.key);
     std::size_t const length = LdiTree::content_bytes(cell);
-    std::memcpy(bytes->data() + cell.offset, content.bytes().data(), length);
+    std::copy_n(content.bytes().begin(), length, bytes->data() + cell.offset);
     cell.hash = XXH3_64bits(bytes->data() + cell.offset, length);
     content = {};
   }
   tree.content = {bytes->data(), size};
   tree.owner = bytes;
   link_cells(tree.cells, tree.roots);
-  tree.place_object();
+  if (!tree.cells.empty()) tree.place_object();
   return tree;
 }
 

@@ -6,8 +6,8 @@
 
 namespace scanview {
 
-/// Whether a tree's sums are written too: needed to add images later, two to three times as large as the tree itself,
-/// and never read by what draws it.
+/// Whether a tree's sums are written too: needed to add images later, about twice as large as the tree itself, and
+/// never read by what draws it.
 enum class LdiKeep { sums, tree_alone };
 
 /// Writes a tree whole or not at all; its bytes depend on the tree and the sums alone. `builder`: what it was built by.

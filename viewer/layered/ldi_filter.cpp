@@ -257,6 +257,15 @@ class Gatherer {
   LdiSums sums_;
 };
 
+bool has_children(LdiCellKey const& parent, Contents const& contents) {
+  for (std::int64_t which = 0; which < 8; ++which) {
+    LdiCellKey child{parent.level - 1, {}};
+    for (std::size_t k = 0; k < 3; ++k) child.index[k] = 2 * parent.index[k] + (which >> k & 1);
+    if (contents.contains(child)) return true;
+  }
+  return false;
+}
+
 /// The level at which all cells lie within two along each axis: the root's children.
 int top_level(LdiSumCells const& sums) {
   int level = std::numeric_limits<int>::min();
@@ -310,7 +319,8 @@ LdiTree filter_upwards(LdiSumCells const& sums, LdiOptions const& options, Conte
     });
     std::vector<LdiCellKey> parents;
     for (std::size_t i = 0; i < keys.size(); ++i) {
-      if (made[i].count() == 0) continue;
+      // A cell without pixels still is the way to its children: what covers too little to be seen from afar.
+      if (made[i].count() == 0 && !has_children(keys[i], contents)) continue;
       contents.emplace(keys[i], std::move(made[i]));
       parents.push_back(keys[i].parent());
     }

@@ -37,9 +37,16 @@ void LdiRenderer::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
   has_passing_ = false;
   traversed_.clear();
   postponed_.clear();
-  splats_ = gaps_ = uncovered_ = 0;
+  splats_ = filling_splats_ = gaps_ = uncovered_ = 0;
+  damaged_.clear();
   until_px_ = 0;
   stages_.clear();
+}
+
+std::size_t LdiRenderer::draw_on(SplatCanvas& canvas, std::vector<CellPart> const& parts, cv::Mat1b const& stencil) {
+  std::size_t const splats = canvas.draw(*tree_, parts, stencil, context_);
+  damaged_.insert(canvas.damaged().begin(), canvas.damaged().end());
+  return splats;
 }
 
 /// Pixels that stay go to the lasting canvas, those that finer ones will replace to the passing one; patches last.
@@ -57,11 +64,11 @@ void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
   }
   for (TraversedCell const& at : cells) lasting.push_back({at.cell, LdiKind::patch});
   traversed_.insert(traversed_.end(), cells.begin(), cells.end());
-  splats_ += lasting_.draw(*tree_, lasting, {}, context_);
+  splats_ += draw_on(lasting_, lasting, {});
   has_passing_ = !passing.empty();
   if (has_passing_) {
     passing_.begin(camera_, object_from_camera_);
-    splats_ += passing_.draw(*tree_, passing, {}, context_);
+    splats_ += draw_on(passing_, passing, {});
   }
 }
 
@@ -85,6 +92,7 @@ bool LdiRenderer::refine() {
 Frame LdiRenderer::picture() {
   double start = now();
   Frame frame;
+  filling_splats_ = 0;
   gaps_ = uncovered_ =
       lasting_.compose(has_passing_ ? &passing_ : nullptr, static_cast<float>(options.covered), frame, context_);
   stages_["compose"] += now() - start;
@@ -119,6 +127,7 @@ Frame LdiRenderer::draw_squares(std::vector<TraversedCell> const& cells) {
   traversed_ = cells;
   Frame frame;
   splats_ = squares_.draw(*tree_, parts, camera_, object_from_camera_, frame, context_);
+  damaged_ = squares_.damaged();
   gaps_ = uncovered_ = frame.color.total() - static_cast<std::size_t>(cv::countNonZero(frame.depth == frame.depth));
   stages_["draw"] = now() - start;
   return frame;
@@ -138,6 +147,16 @@ Frame LdiRenderer::render_within(double milliseconds, Camera const& camera,
   return picture();
 }
 
+/// Columns of a row in which the picture's canvases may hold something.
+std::pair<int, int> LdiRenderer::touched(int y) const {
+  auto const lasting = lasting_.touched(y);
+  if (!has_passing_) return lasting;
+  auto const passing = passing_.touched(y);
+  if (passing.first == passing.second) return lasting;
+  if (lasting.first == lasting.second) return passing;
+  return {std::min(lasting.first, passing.first), std::max(lasting.second, passing.second)};
+}
+
 /// Marks the gaps where something was drawn around (elsewhere there is nothing to fill them with); returns how many
 /// there are.
 std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
@@ -145,7 +164,7 @@ std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
   auto const least = static_cast<uchar>(std::ceil(255 * options.covered));
   std::atomic<std::size_t> gaps = 0;
   for_each_rows(stencil.rows, [&](int y) {
-    auto const [left, right] = lasting_.touched(y);
+    auto const [left, right] = touched(y);
     std::fill(stencil[y], stencil[y] + stencil.cols, uchar{0});
     std::size_t count = static_cast<std::size_t>(stencil.cols - (right - left));
     for (int x = left; x < right; ++x) {
@@ -161,7 +180,7 @@ std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
 /// Pixels that are covered in part and have no gap around them are within a surface, not on an outline: whole.
 void LdiRenderer::close_seams(cv::Mat1b const& stencil, Frame& frame) {
   for_each_rows(stencil.rows, [&](int y) {
-    auto const [left, right] = lasting_.touched(y);
+    auto const [left, right] = touched(y);
     for (int x = left; x < right; ++x) {
       cv::Vec4b& pixel = frame.color(y, x);
       if (pixel[3] == 255 || stencil(y, x) != 0) continue;
@@ -194,7 +213,7 @@ void LdiRenderer::fill_gaps(Frame& frame) {
   for (auto const& [level, parts] : levels) {
     if (uncovered_ == 0) break;
     filling_.begin(camera_, object_from_camera_);
-    splats_ += filling_.draw(*tree_, parts, stencil, context_);
+    filling_splats_ += draw_on(filling_, parts, stencil);
     filling_.fill_beneath(stencil, frame, context_);
     uncovered_ = find_gaps(frame, stencil);
   }

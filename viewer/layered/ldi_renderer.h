@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/context.h"
@@ -48,10 +49,13 @@ class LdiRenderer : public Renderer {
 
   // Of the last picture:
   std::vector<TraversedCell> const& traversed() const { return traversed_; }
-  std::size_t splats() const { return splats_; }
+  std::size_t splats() const { return splats_ + filling_splats_; }
+  std::size_t filling_splats() const { return filling_splats_; }  ///< those of them that were to fill gaps
   /// Pixels that nothing covered before gaps were filled, and after.
   std::size_t gaps() const { return gaps_; }
   std::size_t uncovered() const { return uncovered_; }
+  /// Cells of the tree's file that are damaged, and why: they were left out.
+  std::map<std::int32_t, std::string> const& damaged() const { return damaged_; }
   bool is_complete() const { return postponed_.empty(); }
   std::map<std::string, double> const& stages() const { return stages_; }  ///< milliseconds
 
@@ -60,8 +64,10 @@ class LdiRenderer : public Renderer {
 
  private:
   void draw(std::vector<TraversedCell> const& cells);
+  std::size_t draw_on(SplatCanvas& canvas, std::vector<CellPart> const& parts, cv::Mat1b const& stencil);
   Frame draw_squares(std::vector<TraversedCell> const& cells);
   void fill_gaps(Frame& frame);
+  std::pair<int, int> touched(int y) const;
   std::size_t find_gaps(Frame const& frame, cv::Mat1b& stencil);
   void close_seams(cv::Mat1b const& stencil, Frame& frame);
   void for_each_rows(int rows, std::function<void(int)> const& work);
@@ -76,7 +82,8 @@ class LdiRenderer : public Renderer {
   bool has_passing_ = false;
   double until_px_ = 0;
   std::vector<TraversedCell> traversed_, postponed_;
-  std::size_t splats_ = 0, gaps_ = 0, uncovered_ = 0;
+  std::size_t splats_ = 0, filling_splats_ = 0, gaps_ = 0, uncovered_ = 0;
+  std::map<std::int32_t, std::string> damaged_;
   std::map<std::string, double> stages_;
 };
 

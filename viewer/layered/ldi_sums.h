@@ -21,6 +21,7 @@ struct LdiSum {
 /// up are those of rims (Stamp::rim).
 class LdiSums {
  public:
+  static constexpr int kFaces = 2 * kLdiFaces;
   /// Sums of weights above this could overflow: of sixty thousand whole pictures.
   static constexpr std::uint32_t kMostWeight = 0xffffffffU / 256;
 
@@ -40,7 +41,7 @@ class LdiSums {
 
  private:
   std::size_t resolution_;
-  std::vector<std::uint32_t> heads_[2 * kLdiFaces];
+  std::vector<std::uint32_t> heads_[kFaces];
   std::vector<LdiSum> pool_;
 };
 

@@ -17,6 +17,24 @@ void check_range(double value, double least, double most, char const* name, char
   if (!(value >= least && value <= most)) throw Error(ErrorCode::usage, {}, std::string(name) + ": must be " + range);
 }
 
+/// Whether the blocks lie within the cell, have its pixels among them and come kind after kind: the hash is no proof,
+/// as whoever makes a file can make it fit.
+bool are_sound(std::span<LdiBlock const> blocks, LdiCell const& cell, int resolution) {
+  std::size_t const patches = cell.blocks_of_kind[0], filtered = patches + cell.blocks_of_kind[1];
+  std::uint64_t pixels = 0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    LdiBlock const& block = blocks[i];
+    LdiKind const kind = i < patches ? LdiKind::unfiltered : i < filtered ? LdiKind::patch : LdiKind::filtered;
+    if (block.count == 0 || block.count > LdiBlock::kMost || block.first != pixels || block.face >= kLdiFaces ||
+        block.kind != kind)
+      return false;
+    for (int k = 0; k < 3; ++k)
+      if (block.low[k] > block.high[k] || block.high[k] >= resolution) return false;
+    pixels += block.count;
+  }
+  return pixels == cell.pixels;
+}
+
 }  // namespace
 
 void LdiOptions::validate() const {
@@ -39,16 +57,20 @@ bool LdiCell::has_children() const {
 std::uint64_t LdiTree::content_bytes(LdiCell const& cell) { return LdiLayout(cell.blocks(), cell.pixels).end; }
 
 std::span<LdiBlock const> LdiTree::blocks(LdiCell const& cell) const {
+  std::span<LdiBlock const> const blocks(
+      static_cast<LdiBlock const*>(static_cast<void const*>(content.data() + cell.offset)), cell.blocks());
   if (checked) {
     std::size_t const number = static_cast<std::size_t>(&cell - cells.data());
     std::atomic_ref<std::uint8_t> mark((*checked)[number]);
     if (mark.load(std::memory_order_relaxed) == 0) {
       if (XXH3_64bits(content.data() + cell.offset, content_bytes(cell)) != cell.hash)
         throw Error(ErrorCode::bad_input, path, "is damaged: a cell's pixels are not those that were written");
+      if (!are_sound(blocks, cell, options.resolution))
+        throw Error(ErrorCode::bad_input, path, "is damaged: a cell's blocks do not lie within it");
       mark.store(1, std::memory_order_relaxed);
     }
   }
-  return {static_cast<LdiBlock const*>(static_cast<void const*>(content.data() + cell.offset)), cell.blocks()};
+  return blocks;
 }
 
 LdiPixels LdiTree::pixels(LdiCell const& cell) const {
@@ -81,8 +103,9 @@ void LdiTree::place_object() {
   std::vector<Eigen::Vector3d> points;
   std::vector<double> weights;
   double total = 0;
-  for (std::int32_t const root : roots) {
-    LdiCell const& cell = cells[static_cast<std::size_t>(root)];
+  auto const coarsest = std::find_if(cells.begin(), cells.end(), [](LdiCell const& cell) { return cell.pixels > 0; });
+  for (auto it = coarsest; it != cells.end() && it->key.level == coarsest->key.level; ++it) {
+    LdiCell const& cell = *it;
     Eigen::Vector3d const corner = ldi_corner(cell.key, options.resolution);
     double const step = ldi_step(cell.key.level);
     LdiPixels const p = pixels(cell);

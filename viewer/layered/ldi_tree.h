@@ -75,7 +75,8 @@ class LdiTree {
   /// Depths of that level's pixels that differ by less are one surface.
   double merge_distance(int level) const;
   Eigen::AlignedBox3d box(LdiCell const& cell) const;
-  /// Sets center and radius: the median of the pixels of the roots, and the distance of 99 % of them.
+  /// Sets center and radius: the median of the pixels of the coarsest level that has any, and the distance of 99 %
+  /// of them.
   void place_object();
 
   /// The content's bytes, of all cells one after the other, and who owns them.

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "base/srgb.h"
 #include "viewer/layered/ldi_traversal.h"
@@ -155,6 +156,7 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
   double const near = nearest_drawn(tree);
   std::vector<DrawnCell> cells(parts.size());
   std::vector<std::vector<DrawnBlock>> blocks_of(parts.size());
+  std::vector<std::string> damage(parts.size());
   int const width = camera_.width(), height = camera_.height();
   std::optional<StencilTiles> tiles;
   if (!stencil.empty()) tiles.emplace(stencil);
@@ -168,7 +170,13 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
       std::size_t const first = last - cell.blocks_of_kind[kind];
       if (first >= last) continue;
       DrawnCell& drawn = cells[p];
-      auto const blocks = tree.blocks(cell);
+      std::span<LdiBlock const> blocks;
+      try {
+        blocks = tree.blocks(cell);
+      } catch (Error const& error) {
+        damage[p] = error.what();
+        continue;
+      }
       drawn.pixels = tree.pixels(cell);
       unsigned known = 0;
       for (std::size_t k = first; k < last; ++k) {
@@ -230,6 +238,9 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
       }
     }
   });
+  damaged_.clear();
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    if (!damage[p].empty()) damaged_.emplace(parts[p].cell, std::move(damage[p]));
   std::vector<std::vector<DrawnBlock>> of_band(bands());
   for (auto const& list : blocks_of)
     for (DrawnBlock const& block : list)

@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
+#include <map>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -29,8 +31,10 @@ class SplatCanvas {
   /// Empty, of the camera's size.
   void begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera);
   /// Splats in this order; nearest first is fastest. `stencil`: where it is 0 nothing is drawn (empty: everywhere).
-  /// Returns the number of splats: one that lies in two bands counts twice.
+  /// Returns the number of splats: one that lies in two bands counts twice. Damaged cells are left out: damaged().
   std::size_t draw(LdiTree const& tree, std::vector<CellPart> const& parts, cv::Mat1b const& stencil, Context& context);
+  /// Cells that the last draw() left out, and why (LdiTree::blocks).
+  std::map<std::int32_t, std::string> const& damaged() const { return damaged_; }
   /// The layers composed from the front (§3.3), of this canvas and, where there is one, of another that was begun for
   /// the same camera. Returns the number of pixels that are covered less than `covered`.
   std::size_t compose(SplatCanvas const* more, float covered, Frame& frame, Context& context) const;
@@ -63,6 +67,7 @@ class SplatCanvas {
     int left = 1 << 30, right = 0;  ///< columns in which something may have been drawn
   };
   std::vector<Touched> touched_;  ///< of each band
+  std::map<std::int32_t, std::string> damaged_;
 };
 
 }  // namespace scanview

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "base/srgb.h"
 #include "viewer/layered/ldi_traversal.h"
@@ -70,10 +71,17 @@ std::size_t SquareCanvas::draw(LdiTree const& tree, std::vector<CellPart> const&
     for (std::size_t k = 0; k < kind; ++k) first += cell.blocks_of_kind[k];
     return blocks.subspan(first, cell.blocks_of_kind[kind]);
   };
+  damaged_.clear();
+  std::vector<std::span<LdiBlock const>> blocks_of_part(parts.size());
   std::vector<std::size_t> pixels(parts.size() + 1);  // before each part
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    auto const blocks = blocks_of(parts[p]);
     pixels[p + 1] = pixels[p];
+    try {
+      blocks_of_part[p] = blocks_of(parts[p]);
+    } catch (Error const& error) {
+      damaged_.emplace(parts[p].cell, error.what());
+    }
+    auto const blocks = blocks_of_part[p];
     if (!blocks.empty()) pixels[p + 1] += blocks.back().first + blocks.back().count - blocks.front().first;
   }
   std::size_t const processors = static_cast<std::size_t>(oneapi::tbb::info::default_concurrency());
@@ -88,7 +96,7 @@ std::size_t SquareCanvas::draw(LdiTree const& tree, std::vector<CellPart> const&
     for (std::size_t p = 0; p < parts.size(); ++p) {
       if (pixels[p] / grain % layers_.size() != k) continue;
       LdiCell const& cell = tree.cells[static_cast<std::size_t>(parts[p].cell)];
-      auto const blocks = blocks_of(parts[p]);
+      auto const blocks = blocks_of_part[p];
       // Blocks of a face follow one another.
       for (std::size_t b = 0; b < blocks.size();) {
         std::size_t end = b;

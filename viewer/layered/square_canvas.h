@@ -1,4 +1,7 @@
 #pragma once
+#include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "base/context.h"
@@ -13,9 +16,12 @@ namespace scanview {
 class SquareCanvas {
  public:
   /// Draws parts of cells for a camera, nearest first is fastest. Equal pictures in any order and on any number of
-  /// threads. Returns the number of LDI pixels that were looked at.
+  /// threads. Returns the number of LDI pixels that were looked at. Damaged cells are left out: damaged().
   std::size_t draw(LdiTree const& tree, std::vector<CellPart> const& parts, Camera const& camera,
                    Eigen::Isometry3d const& object_from_camera, Frame& frame, Context& context);
+
+  /// Cells that the last draw() left out, and why (LdiTree::blocks).
+  std::map<std::int32_t, std::string> const& damaged() const { return damaged_; }
 
  private:
   /// A thread's own picture.
@@ -24,6 +30,7 @@ class SquareCanvas {
     std::vector<std::uint32_t> color;
   };
   std::vector<Layer> layers_;
+  std::map<std::int32_t, std::string> damaged_;
 };
 
 }  // namespace scanview

@@ -197,6 +197,26 @@ std::vector<PathCamera> halfway_path(ScanSet const& set, OrbitFrame const& frame
   return path;
 }
 
+std::vector<PathCamera> path_through_views(ScanSet const& set, OrbitFrame const& frame, int count, int width,
+                                           int height) {
+  check_size(width, height);
+  if (std::any_of(set.views.begin(), set.views.end(),
+                  [](View const& view) { return !view.image.camera.is_perspective(); }))
+    return orbit_path(set, frame, count, width, height);
+  bool const around = frame.distance > frame.radius;
+  std::vector<PathCamera> path;
+  for (int i = 0; i < count; ++i) {
+    double const at = count > 1 ? static_cast<double>(i) * static_cast<double>(set.views.size() - 1) / (count - 1) : 0;
+    std::size_t const from = static_cast<std::size_t>(at), to = std::min(from + 1, set.views.size() - 1);
+    double const t = at - static_cast<double>(from);
+    Isometry3d const &a = *set.views[from].object_from_camera, &b = *set.views[to].object_from_camera;
+    path.push_back({fit_camera(set.views[t < 0.5 ? from : to].image.camera, width, height),
+                    around ? between_poses(a, b, t, set.center, frame.up) : between_straight(a, b, t),
+                    fmt::format("{:03}", i)});
+  }
+  return path;
+}
+
 std::vector<PathCamera> read_camera_path(std::filesystem::path const& file, ScanSet const& set, OrbitFrame const& frame,
                                          int width, int height, PathMotion motion) {
   check_size(width, height);

@@ -56,6 +56,12 @@ inline std::vector<PathCamera> halfway_path(ScanSet const& set, int width, int h
   return halfway_path(set, orbit_frame(set), width, height);
 }
 
+/// From the first view to the last through all between them, `count` frames in even steps: on arcs about the centre, or
+/// straight where the eyes are inside the object's sphere (a room). Each frame has the camera of the view it is nearest
+/// to. Where a view is orthographic: an orbit.
+std::vector<PathCamera> path_through_views(ScanSet const& set, OrbitFrame const& frame, int count, int width,
+                                           int height);
+
 /// How an eye gets from one keyframe to the next: on an arc about the set's centre, or straight on.
 enum class PathMotion { about_center, straight };
 

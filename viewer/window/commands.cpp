@@ -120,6 +120,35 @@ std::optional<Command> walk_command_of_key(int key) {
   }
 }
 
+std::optional<Command> tree_command_of_key(int key) {
+  switch (key) {
+    case GLFW_KEY_ESCAPE:
+      return Command::quit;
+    case GLFW_KEY_SPACE:
+      return Command::turntable;
+    case GLFW_KEY_HOME:
+      return Command::reset;
+    case GLFW_KEY_K:
+      return Command::add_keyframe;
+    case GLFW_KEY_O:
+      return Command::toggle_walking;
+    case GLFW_KEY_C:
+      return Command::next_cells;
+    case GLFW_KEY_V:
+      return Command::toggle_levels;
+    case GLFW_KEY_G:
+      return Command::next_gaps;
+    case GLFW_KEY_T:
+      return Command::next_detail;
+    case GLFW_KEY_N:
+      return Command::next_view;
+    case GLFW_KEY_B:
+      return Command::previous_view;
+    default:
+      return common_command_of_key(key);
+  }
+}
+
 std::optional<WalkStep> walk_step_of_key(int key) {
   constexpr double kTurnDeg = 75;
   switch (key) {
@@ -188,6 +217,27 @@ std::string model_window_help() {
          "N: silhouettes and creases on white paper\n"
          "U: another of the model's axes is up\n"
          "C: add a camera for visibility build --cameras\n"
+         "Tab: panel on and off\n"
+         "H: this help\n"
+         "Esc: quit";
+}
+
+std::string tree_window_help() {
+  return "O: go around the object, or walk in the scene\n"
+         "going around it: left drag: turn; right, middle or shift drag: pan; wheel: nearer, further; double click: "
+         "the "
+         "pivot that turning is about\n"
+         "walking: W, S or up, down: forwards, backwards; A, D: sideways; left, right: turn; E, Q or page up, page "
+         "down: raise, lower the eye; shift: three times as fast; drag: look around; wheel: forwards, backwards\n"
+         "1-9, N, B: to a reference view, the next, the one before; or click it in the map\n"
+         "R or Home: back to the start\n"
+         "space: turn or look around, on and on\n"
+         "C: the cells that are drawn, then also those above them, then none\n"
+         "V: the level that each pixel comes from\n"
+         "G: gaps filled from the levels above, as background, or magenta\n"
+         "T: the detail: how many pixels a sample may be wide\n"
+         "P: save a picture\n"
+         "K: add a keyframe for ldi render --path\n"
          "Tab: panel on and off\n"
          "H: this help\n"
          "Esc: quit";

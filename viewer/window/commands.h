@@ -54,6 +54,11 @@ enum class Command {
   toggle_free,
   previous_node,
   next_node,
+  // Of a tree's window:
+  next_detail,
+  next_cells,
+  toggle_levels,
+  toggle_walking,
 };
 
 /// The command of a key (GLFW's number); nothing where it has none in this mode. M, N and O lead into their modes and,
@@ -66,8 +71,11 @@ std::optional<Command> model_command_of_key(int key);
 /// The same in the window of a walkthrough, for keys that do something once.
 std::optional<Command> walk_command_of_key(int key);
 
-/// What a key does for as long as it is held in the window of a walkthrough: a step of length 1, or the degrees of a
-/// quick look around, in a second.
+/// The same in the window of an LDI tree.
+std::optional<Command> tree_command_of_key(int key);
+
+/// What a key does for as long as it is held in the window of a walkthrough, and of a tree that is walked in: a step of
+/// length 1, or the degrees of a quick look around, in a second.
 std::optional<WalkStep> walk_step_of_key(int key);
 
 /// 0 to 8 for the keys 1 to 9.
@@ -77,5 +85,6 @@ std::optional<std::size_t> view_of_key(int key);
 std::string window_help();
 std::string model_window_help();
 std::string walk_window_help();
+std::string tree_window_help();
 
 }  // namespace scanview

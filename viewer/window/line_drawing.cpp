@@ -68,20 +68,20 @@ bool clip_to_picture(LineEnd& a, LineEnd& b, cv::Size const& size) {
   return true;
 }
 
-void draw_run(cv::Mat4b& picture, LineEnd const& a, LineEnd const& b) {
+void draw_run(cv::Mat4b& picture, LineEnd const& a, LineEnd const& b, cv::Vec4b const& color) {
   constexpr int kBits = 8;
   auto const place = [](Vector2d const& p) {
     return cv::Point(static_cast<int>(std::lround(p.x() * (1 << kBits))),
                      static_cast<int>(std::lround(p.y() * (1 << kBits))));
   };
-  cv::line(picture, place(a.pixel), place(b.pixel), cv::Scalar(0, 0, 0, 255), 1, cv::LINE_AA, kBits);
+  cv::line(picture, place(a.pixel), place(b.pixel), cv::Scalar(color), 1, cv::LINE_AA, kBits);
 }
 
 }  // namespace
 
 void draw_seen_lines(cv::Mat4b& picture, cv::Mat1f const& depth, Camera const& camera,
                      Eigen::Isometry3d const& object_from_camera, std::vector<Eigen::Vector3f> const& vertices,
-                     std::vector<Eigen::Vector2i> const& lines) {
+                     std::vector<Eigen::Vector2i> const& lines, std::vector<cv::Vec4b> const& colors) {
   if (lines.empty() || picture.empty()) return;
   cv::Mat1d const farthest = farthest_keys(depth, camera.is_perspective());
   Eigen::Isometry3d const camera_from_object = object_from_camera.inverse();
@@ -90,7 +90,8 @@ void draw_seen_lines(cv::Mat4b& picture, cv::Mat1f const& depth, Camera const& c
   for (float const z : depth) nearest = z < nearest ? z : nearest;
   if (!std::isfinite(nearest)) return;
   double const near = camera.is_perspective() ? 0.5 * nearest : -std::numeric_limits<double>::infinity();
-  for (auto const& line : lines) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    Eigen::Vector2i const& line = lines[i];
     Vector3d ends[2];
     for (int k = 0; k < 2; ++k)
       ends[k] = camera_from_object * vertices[static_cast<std::size_t>(line[k])].cast<double>();
@@ -112,7 +113,7 @@ void draw_seen_lines(cv::Mat4b& picture, cv::Mat1f const& depth, Camera const& c
       while (end < steps && is_seen(end)) ++end;
       if (end > begin)
         draw_run(picture, between(a, b, static_cast<double>(begin) / steps),
-                 between(a, b, static_cast<double>(end) / steps));
+                 between(a, b, static_cast<double>(end) / steps), colors.empty() ? cv::Vec4b(0, 0, 0, 255) : colors[i]);
     }
   }
 }

@@ -5,14 +5,12 @@
 #include <vector>
 
 #include "viewer/walkthrough/walkthrough_renderer.h"
-#include "viewer/window/walk_control.h"
+#include "viewer/window/ground_map.h"
 
 namespace scanview {
 
-/// A plan of a walkthrough's nodes, seen from above: places are in units of its width, from its upper left corner, x
-/// east, y south. Nodes, the box that can be walked in and the eye are all on it.
-struct NodeMap {
-  static constexpr double kHeight = 0.62;  ///< of the drawing, to its width
+/// A plan of a walkthrough's nodes: nodes, the box that can be walked in and the eye are all on it.
+struct NodeMap : GroundMap {
   struct Dot {
     std::size_t node = 0;
     Eigen::Vector2d at{0, 0};
@@ -22,10 +20,6 @@ struct NodeMap {
   };
   std::vector<Dot> dots;
   std::vector<std::array<Eigen::Vector2d, 2>> edges;  ///< of the box
-  Eigen::Vector2d eye{0, 0};
-  std::array<Eigen::Vector2d, 2> view = {};  ///< ends of the rays at the left and at the right of the picture
-  double bar = 0;                            ///< a round length of the scene, to show the scale by
-  double bar_width = 0;                      ///< of the drawing
 
   /// The node whose dot is nearest to a place and within `reach` of it; dots.size() where there is none.
   std::size_t nearest(Eigen::Vector2d const& at, double reach) const;

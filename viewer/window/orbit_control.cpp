@@ -21,10 +21,8 @@ ScanSet set_about(Vector3d const& center) {
 }
 }  // namespace
 
-OrbitControl::OrbitControl(ScanSet const& set, double radius)
-    : center_(set.center),
-      frame_(orbit_frame(set, radius)),
-      start_(framing_camera(set, frame_, frame_.start, kPixels, kPixels)) {
+OrbitControl::OrbitControl(ScanSet const& set, OrbitFrame const& frame)
+    : center_(set.center), frame_(frame), start_(framing_camera(set, frame_, frame_.start, kPixels, kPixels)) {
   for (auto const& view : set.views) {
     Camera const& camera = view.image.camera;
     views_.push_back(camera.is_perspective()
@@ -45,9 +43,9 @@ void OrbitControl::reset() {
   current_ = start_;
 }
 
-void OrbitControl::take_eye_of(OrbitControl const& other) {
-  pivot_ = other.pivot_;
-  current_ = other.current_;
+void OrbitControl::take_eye(PathCamera const& eye, Vector3d const& pivot) {
+  pivot_ = pivot;
+  current_ = eye;
 }
 
 void OrbitControl::rotate(AngleAxisd const& rotation) {

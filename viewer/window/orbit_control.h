@@ -10,12 +10,15 @@ namespace scanview {
 class OrbitControl {
  public:
   /// `radius` is the object's (ViewLibrary::radius). Throws Error{bad_input} where a view has no pose.
-  OrbitControl(ScanSet const& set, double radius);
+  OrbitControl(ScanSet const& set, double radius) : OrbitControl(set, orbit_frame(set, radius)) {}
+  /// With another idea of how to go around it than orbit_frame()'s.
+  OrbitControl(ScanSet const& set, OrbitFrame const& frame);
   /// Of something that has no views, about its centre: begins where framing_camera() stands.
   OrbitControl(Eigen::Vector3d const& center, OrbitFrame const& frame);
   PathCamera const& current() const { return current_; }
   /// Looks from where `other` does, about its pivot: after the set has changed under it.
-  void take_eye_of(OrbitControl const& other);
+  void take_eye_of(OrbitControl const& other) { take_eye(other.current_, other.pivot_); }
+  void take_eye(PathCamera const& eye, Eigen::Vector3d const& pivot);
 
   void reset();
   /// About the set's up direction and the camera's horizontal axis; never over the poles. A full height is half a turn.

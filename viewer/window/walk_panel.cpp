@@ -8,6 +8,7 @@
 
 #include "base/srgb.h"
 #include "viewer/view_based/view_based_renderer.h"
+#include "viewer/window/map_canvas.h"
 
 namespace scanview {
 namespace {
@@ -18,21 +19,8 @@ ImU32 hue_of(std::size_t node, float alpha = 1) {
   return ImGui::GetColorU32(ImVec4(shown(0), shown(1), shown(2), alpha));
 }
 
-std::string length_of(double length, Unit unit) {
-  if (unit == Unit::arbitrary) return fmt::format("{:.3g}", length);
-  return fmt::format("{:.3g} {}", length, to_string(unit));
-}
-
-/// The drawing's place on the screen.
-struct MapCanvas {
-  ImVec2 corner;
-  float width, scale;
-  ImVec2 place(Eigen::Vector2d const& p) const {
-    return {corner.x + width * static_cast<float>(p.x()), corner.y + width * static_cast<float>(p.y())};
-  }
-};
-
-void draw_dot(ImDrawList& list, MapCanvas const& canvas, NodeMap::Dot const& dot) {
+void draw_dot(MapCanvas const& canvas, NodeMap::Dot const& dot) {
+  ImDrawList& list = *canvas.list;
   ImVec2 const at = canvas.place(dot.at);
   if (dot.failed) {
     float const arm = 4 * canvas.scale;
@@ -49,44 +37,19 @@ void draw_dot(ImDrawList& list, MapCanvas const& canvas, NodeMap::Dot const& dot
   if (dot.weight > 0) list.AddCircle(at, size + 1, IM_COL32(255, 255, 255, 255));
 }
 
-void draw_view(ImDrawList& list, MapCanvas const& canvas, NodeMap const& map) {
-  ImVec2 const eye = canvas.place(map.eye), left = canvas.place(map.view[0]), right = canvas.place(map.view[1]);
-  list.AddTriangleFilled(eye, left, right, IM_COL32(255, 220, 90, 60));
-  list.AddLine(eye, left, IM_COL32(255, 220, 90, 220));
-  list.AddLine(eye, right, IM_COL32(255, 220, 90, 220));
-}
-
-void draw_bar(ImDrawList& list, MapCanvas const& canvas, NodeMap const& map, Unit unit) {
-  float const below = canvas.width * static_cast<float>(NodeMap::kHeight);
-  ImVec2 const from(canvas.corner.x + 8 * canvas.scale, canvas.corner.y + below - 6 * canvas.scale);
-  ImVec2 const to(from.x + canvas.width * static_cast<float>(map.bar_width), from.y);
-  ImU32 const light = IM_COL32(200, 205, 215, 255);
-  list.AddLine(from, to, light, 2);
-  std::string const text = length_of(map.bar, unit);
-  list.AddText(ImVec2(from.x, from.y - ImGui::GetTextLineHeight() - 1), light, text.c_str());
-}
-
 void draw_map(WalkPanelContent const& content, float scale, WalkPanelAnswer& answer) {
   NodeMap const& map = content.map;
-  MapCanvas const canvas{ImGui::GetCursorScreenPos(), std::max(1.0F, ImGui::GetContentRegionAvail().x), scale};
-  ImVec2 const size(canvas.width, canvas.width * static_cast<float>(NodeMap::kHeight));
-  ImGui::InvisibleButton("map", size);
-  ImVec2 const end(canvas.corner.x + size.x, canvas.corner.y + size.y);
-  ImDrawList& list = *ImGui::GetWindowDrawList();
-  list.PushClipRect(canvas.corner, end, true);
-  list.AddRectFilled(canvas.corner, end, IM_COL32(30, 34, 40, 255), 3);
+  MapCanvas canvas = MapCanvas::begin(scale);
   for (auto const& edge : map.edges)
-    list.AddLine(canvas.place(edge[0]), canvas.place(edge[1]), IM_COL32(90, 95, 105, 255));
-  draw_view(list, canvas, map);
-  for (auto const& dot : map.dots) draw_dot(list, canvas, dot);
-  list.AddCircleFilled(canvas.place(map.eye), 3 * scale, IM_COL32(255, 220, 90, 255));
-  draw_bar(list, canvas, map, content.unit);
-  list.PopClipRect();
+    canvas.list->AddLine(canvas.place(edge[0]), canvas.place(edge[1]), IM_COL32(90, 95, 105, 255));
+  canvas.draw_view(map);
+  for (auto const& dot : map.dots) draw_dot(canvas, dot);
+  canvas.draw_eye(map);
+  canvas.draw_bar(map, content.unit);
+  canvas.end();
   if (!ImGui::IsItemHovered()) return;
-  ImVec2 const mouse = ImGui::GetIO().MousePos;
   constexpr double kReach = 0.05;
-  std::size_t const node =
-      map.nearest({(mouse.x - canvas.corner.x) / canvas.width, (mouse.y - canvas.corner.y) / canvas.width}, kReach);
+  std::size_t const node = map.nearest(canvas.pointer(), kReach);
   if (node >= content.names.size()) return;
   ImGui::SetTooltip("node %s: click to go there", content.names[node].c_str());
   if (ImGui::IsItemClicked()) answer.jump = node;
@@ -170,7 +133,7 @@ void draw_used(WalkPanelContent const& content, float scale) {
 std::string used_node_text(WalkPanelContent const& content, UsedNode const& used) {
   std::string const share = used.weight > 0 ? fmt::format("{:3.0f} %", 100 * used.weight) : "fills";
   return fmt::format("{} {} {:>8} {:6} tri.", content.names.at(used.node), share,
-                     length_of(used.distance, content.unit), used.triangles);
+                     short_length(used.distance, content.unit), used.triangles);
 }
 
 std::vector<std::string> walk_frame_text(WalkPanelContent const& content) {

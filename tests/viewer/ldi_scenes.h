@@ -1,0 +1,42 @@
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "acquire/scan_set.h"
+#include "viewer/layered/ldi_builder.h"
+
+// Reference images of planes with exact depths, and trees of them.
+
+namespace scanview::test {
+
+/// 8-bit sRGB, blue first, of a point.
+using PlanePaint = std::function<cv::Vec3b(Eigen::Vector3d const&)>;
+PlanePaint plain_paint(cv::Vec3b const& color);
+/// Different everywhere, smooth, with a period of about `period` units.
+PlanePaint wavy_paint(double period);
+
+/// Looking from `eye` at `target`; y up.
+Eigen::Isometry3d toward(Eigen::Vector3d const& eye, Eigen::Vector3d const& target);
+/// 90 degrees wide.
+Camera square_view(int size);
+
+/// What a camera sees of the plane normal · p = offset; nothing where it is behind the camera or seen from behind.
+View plane_view(std::string const& name, Camera const& camera, Eigen::Isometry3d const& object_from_camera,
+                Eigen::Vector3d const& normal, double offset, PlanePaint const& paint);
+/// One pixel at the middle of an image of one pixel, of a surface that faces the camera.
+View pixel_view(Camera const& camera, Eigen::Isometry3d const& object_from_camera, float depth, cv::Vec3b const& color);
+
+LdiBuilder builder_of(std::vector<View> const& views, LdiOptions const& options = {}, int threads = 0);
+LdiTree tree_of(std::vector<View> const& views, LdiOptions const& options = {}, int threads = 0);
+
+/// An LDI pixel in the scene.
+struct PlacedPixel {
+  Eigen::Vector3d at;
+  int level = 0, face = 0;
+  LdiKind kind = LdiKind::unfiltered;
+  double alpha = 0;           ///< 0 to 1
+  cv::Vec3d linear{0, 0, 0};  ///< red first, 0 to 1
+};
+std::vector<PlacedPixel> pixels_of(LdiTree const& tree);
+
+}  // namespace scanview::test
