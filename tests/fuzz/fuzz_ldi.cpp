@@ -55,6 +55,10 @@ extern "C" int LLVMFuzzerTestOneInput(std::uint8_t const* data, std::size_t size
     for (scanview::LdiCell const& cell : tree.cells) tree.blocks(cell);
   });
   attempt([&] { scanview::read_ldi_builder(path); });
-  attempt([&] { scanview::decode_sums({reinterpret_cast<char const*>(data), size}, 8, path); });
+  attempt([&] {
+    scanview::LdiOptions options;
+    options.resolution = 8;
+    scanview::decode_sums({reinterpret_cast<char const*>(data), size}, options, path);
+  });
   return 0;
 }

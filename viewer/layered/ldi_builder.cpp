@@ -142,11 +142,11 @@ bool splat(Landing const& landing, LdiSums& sums) {
       float const depth = landing.depth + landing.slope_x * dx + landing.slope_y * dy;
       std::int32_t const whole = static_cast<std::int32_t>(depth), in_cell = landing.bin + whole - kDeep;
       if (in_cell < 0 || in_cell >= n) continue;
-      std::uint32_t const bin = static_cast<std::uint32_t>(in_cell);
-      LdiSum& sum = sums.at(landing.face, x, y, bin);
+      int const shift = sums.bin_shift(), in_bin = in_cell & (sums.bin_steps() - 1);
+      LdiSum& sum = sums.at(landing.face, x, y, static_cast<std::uint32_t>(in_cell >> shift));
       if (sum.weight > LdiSums::kMostWeight - weight) return false;
       sum.weight += weight;
-      sum.depth += weight * static_cast<std::uint32_t>((depth - float(whole)) * 256);
+      sum.depth += weight * (static_cast<std::uint32_t>((float(in_bin) + (depth - float(whole))) * 256) >> shift);
       sum.red += std::uint64_t{weight} * landing.red;
       sum.green += std::uint64_t{weight} * landing.green;
       sum.blue += std::uint64_t{weight} * landing.blue;
@@ -231,7 +231,7 @@ void LdiBuilder::add_batch(std::vector<View> const& views, std::size_t begin, st
   std::vector<std::pair<LdiSums*, std::vector<Part> const*>> jobs;
   for (auto const& [key, list] : parts) {
     auto& sums = cells_[key];
-    if (!sums) sums = std::make_unique<LdiSums>(options_.resolution);
+    if (!sums) sums = std::make_unique<LdiSums>(options_.resolution, options_.bin_shift(key.level));
     jobs.emplace_back(sums.get(), &list);
   }
   // Long ones first, so that none is left when the others are done.

@@ -243,7 +243,7 @@ LdiBuilder read_ldi_builder(fs::path const& path) {
   if (XXH3_64bits(sums, prologue.sums_bytes) != prologue.sums_hash)
     refuse(path, "is damaged: its sums are not those that were written");
   LdiBuilder builder(tree.options);
-  builder.resume(tree, decode_sums({sums, prologue.sums_bytes}, tree.options.resolution, path));
+  builder.resume(tree, decode_sums({sums, prologue.sums_bytes}, tree.options, path));
   return builder;
 }
 

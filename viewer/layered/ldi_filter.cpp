@@ -21,10 +21,10 @@ constexpr int kLeastCover = 3;
 struct Layer {
   double weight = 0, depth = 0, red = 0, green = 0, blue = 0, slope_x = 0, slope_y = 0;  // sums
   double at() const { return depth / weight; }
-  void add(LdiSum const& sum) {
+  void add(LdiSum const& sum, int bin_steps) {
     double const w = sum.weight;
     weight += w;
-    depth += w * sum.bin + (sum.depth + 0.5 * w) / 256;
+    depth += bin_steps * (w * sum.bin + (sum.depth + 0.5 * w) / 256);
     red += double(sum.red);
     green += double(sum.green);
     blue += double(sum.blue);
@@ -48,7 +48,7 @@ void layers_of(LdiSums const* sums, int face, int x, int y, double merge, std::v
   if (sums == nullptr) return;
   for (std::uint32_t k = sums->first(face, x, y); k != 0; k = (*sums)[k].next) {
     Layer one;
-    one.add((*sums)[k]);
+    one.add((*sums)[k], sums->bin_steps());
     if (!layers.empty() && one.at() - layers.back().at() < merge) {
       layers.back() = layers.back() + one;
     } else {
@@ -102,6 +102,7 @@ class Merger {
   double merge_steps(int level) const { return std::max(options_.merge_steps, options_.depth_error / ldi_step(level)); }
 
   void merge_place(int face, int x, int y) {
+    constexpr double kRounding = 1.0 / 128;  // of coverages in 8 bits
     double const within = merge_steps(key_.level);
     layers_of(own_, face, x, y, within, here_);
     layers_of(own_, face + kLdiFaces, x, y, within, rims_);
@@ -112,7 +113,7 @@ class Merger {
       double const cover = std::min(1.0, layer.weight / kOwnFull);
       Layer* const nearest = find(below_, layer.at(), within);
       double const other_cover = nearest != nullptr ? std::min(1.0, nearest->weight / kFilteredFull) : 0;
-      if (nearest != nullptr && other_cover >= options_.covered * cover) {
+      if (nearest != nullptr && other_cover + kRounding >= options_.covered * cover) {
         // "The merged pixel is also considered filtered" (Chang 1998, §3.1). What comes from below counts four times:
         // of finer images.
         double const share = 4 * other_cover / (4 * other_cover + cover);
@@ -152,7 +153,8 @@ class Merger {
     if (!has(sums, face)) return 0;
     double cover = 0;
     for (std::uint32_t k = sums->first(face, x, y); k != 0; k = (*sums)[k].next)
-      if (std::abs((*sums)[k].bin + 0.5 - at) < within + 0.5) cover += (*sums)[k].weight;
+      if (std::abs(((*sums)[k].bin + 0.5) * sums->bin_steps() - at) < within + 0.5 * sums->bin_steps())
+        cover += (*sums)[k].weight;
     return cover / full;
   }
 

@@ -40,6 +40,8 @@ void LdiRenderer::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
   splats_ = filling_splats_ = gaps_ = uncovered_ = 0;
   damaged_.clear();
   until_px_ = 0;
+  steps_ = 0;
+  is_complete_ = false;
   stages_.clear();
 }
 
@@ -49,7 +51,8 @@ std::size_t LdiRenderer::draw_on(SplatCanvas& canvas, std::vector<CellPart> cons
   return splats;
 }
 
-/// Pixels that stay go to the lasting canvas, those that finer ones will replace to the passing one; patches last.
+/// Pixels that stay go to the lasting canvas, those that finer ones will replace to the passing one; patches when all
+/// else has been drawn.
 void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
   std::vector<CellPart> lasting, passing;
   postponed_.clear();
@@ -62,8 +65,10 @@ void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
       lasting.push_back({at.cell, LdiKind::filtered});
     }
   }
-  for (TraversedCell const& at : cells) lasting.push_back({at.cell, LdiKind::patch});
   traversed_.insert(traversed_.end(), cells.begin(), cells.end());
+  is_complete_ = postponed_.empty();
+  if (is_complete_)
+    for (TraversedCell const& at : traversed_) lasting.push_back({at.cell, LdiKind::patch});
   splats_ += draw_on(lasting_, lasting, {});
   has_passing_ = !passing.empty();
   if (has_passing_) {
@@ -73,24 +78,42 @@ void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
 }
 
 bool LdiRenderer::refine() {
+  if (is_complete_) return false;
   double const start = now();
+  bool const blended = options.splats == LdiRenderOptions::Splats::blended;
   TraversalOptions how;
   how.stamp_px = options.stamp_px;
-  if (until_px_ == 0) {
-    how.until_px = until_px_ = std::max(kFirstPx, options.stamp_px);
-    draw(traverse(*tree_, camera_, object_from_camera_, how));
-  } else if (!postponed_.empty()) {
-    how.until_px = until_px_ = std::max(until_px_ / 2, options.stamp_px);
-    for (TraversedCell& at : traversed_)
-      if (at.postponed) at.postponed = false, at.descended = true;
-    draw(traverse_below(*tree_, std::vector<TraversedCell>(postponed_), camera_, object_from_camera_, how));
+  if (steps_ == 0 || !blended) {
+    if (steps_ == 0) how.stamp_px = std::max(kFirstPx, options.stamp_px);
+    rough_ = draw_squares(traverse(*tree_, camera_, object_from_camera_, how));
+    is_complete_ = steps_ > 0;
+  } else {
+    refine_blended(how);
   }
   stages_["draw"] += now() - start;
-  return !postponed_.empty();
+  step_milliseconds_.resize(std::max(step_milliseconds_.size(), static_cast<std::size_t>(steps_ + 1)));
+  step_milliseconds_[static_cast<std::size_t>(steps_++)] = now() - start;
+  return !is_complete_;
+}
+
+void LdiRenderer::refine_blended(TraversalOptions how) {
+  if (steps_ == 1) {
+    traversed_.clear();
+    splats_ = 0;
+    how.until_px = until_px_ = std::max(kFirstPx, options.stamp_px);
+    draw(traverse(*tree_, camera_, object_from_camera_, how));
+    return;
+  }
+  how.until_px = until_px_ = std::max(until_px_ / 2, options.stamp_px);
+  for (TraversedCell& at : traversed_)
+    if (at.postponed) at.postponed = false, at.descended = true;
+  draw(traverse_below(*tree_, std::vector<TraversedCell>(postponed_), camera_, object_from_camera_, how));
 }
 
 Frame LdiRenderer::picture() {
-  double start = now();
+  if (steps_ == 1 || (steps_ > 0 && options.splats == LdiRenderOptions::Splats::squares)) return rough_;
+  double const begun = now();
+  double start = begun;
   Frame frame;
   filling_splats_ = 0;
   gaps_ = uncovered_ =
@@ -99,6 +122,7 @@ Frame LdiRenderer::picture() {
   start = now();
   fill_gaps(frame);
   stages_["fill"] += now() - start;
+  finish_milliseconds_ = now() - begun;
   return frame;
 }
 
@@ -109,15 +133,19 @@ Frame LdiRenderer::render(Camera const& camera, Eigen::Isometry3d const& object_
   how.stamp_px = options.stamp_px;
   auto const cells = traverse(*tree_, camera_, object_from_camera_, how);
   stages_["traverse"] = now() - start;
-  if (options.splats == LdiRenderOptions::Splats::squares) return draw_squares(cells);
   start = now();
+  if (options.splats == LdiRenderOptions::Splats::squares) {
+    Frame frame = draw_squares(cells);
+    is_complete_ = true;
+    stages_["draw"] = now() - start;
+    return frame;
+  }
   draw(cells);
   stages_["draw"] = now() - start;
   return picture();
 }
 
 Frame LdiRenderer::draw_squares(std::vector<TraversedCell> const& cells) {
-  double const start = now();
   std::vector<CellPart> parts;
   for (TraversedCell const& at : cells) {
     parts.push_back({at.cell, LdiKind::unfiltered});
@@ -129,7 +157,6 @@ Frame LdiRenderer::draw_squares(std::vector<TraversedCell> const& cells) {
   splats_ = squares_.draw(*tree_, parts, camera_, object_from_camera_, frame, context_);
   damaged_ = squares_.damaged();
   gaps_ = uncovered_ = frame.color.total() - static_cast<std::size_t>(cv::countNonZero(frame.depth == frame.depth));
-  stages_["draw"] = now() - start;
   return frame;
 }
 
@@ -137,14 +164,19 @@ Frame LdiRenderer::render_within(double milliseconds, Camera const& camera,
                                  Eigen::Isometry3d const& object_from_camera) {
   double const start = now();
   begin(camera, object_from_camera);
-  for (double last = start; refine();) {
-    double const end = now(), step = end - last;
-    last = end;
-    // Steps of half the size take about four times as long.
-    constexpr double kGrowth = 4;
-    if (end - start + kGrowth * step > milliseconds) break;
-  }
+  bool more = refine();
+  double const first = now() - start;
+  while (more && now() - start + next_step_milliseconds(first) <= milliseconds) more = refine();
   return picture();
+}
+
+/// What the next step will take, with finishing the picture after it.
+double LdiRenderer::next_step_milliseconds(double first) const {
+  std::size_t const next = static_cast<std::size_t>(steps_);
+  // Of a first picture in steps nothing is known but how long squares take: blended splats take about eight times as
+  // long.
+  constexpr double kBlended = 8;
+  return next < step_milliseconds_.size() ? step_milliseconds_[next] + finish_milliseconds_ : kBlended * first;
 }
 
 /// Columns of a row in which the picture's canvases may hold something.

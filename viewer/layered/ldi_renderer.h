@@ -37,15 +37,16 @@ class LdiRenderer : public Renderer {
 
   Frame render(Camera const& camera, Eigen::Isometry3d const& object_from_camera) override;
 
-  /// A picture in steps (§3.4): begin(), then refine() until it says that nothing is left. The first step draws cells
-  /// whose steps are kFirstPx pixels on the screen, each following one those of half as many; what has been drawn for
-  /// good is not drawn again. picture() at any time.
+  /// A picture in steps (§3.4): begin(), then refine() until it says that nothing is left. The first step is of
+  /// squares, of cells whose steps are kFirstPx pixels on the screen: a tenth of the whole. Then blended splats of
+  /// these cells, and in each following step of cells of half as many pixels; what has been drawn for good is not drawn
+  /// again. picture() at any time.
   void begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera);
   bool refine();
   Frame picture();
-  /// As many steps as fit into so many milliseconds, judged by the steps before; at least the first.
+  /// As many steps as fit into so many milliseconds, judged by those of the picture before; at least the first.
   Frame render_within(double milliseconds, Camera const& camera, Eigen::Isometry3d const& object_from_camera);
-  static constexpr double kFirstPx = 8;
+  static constexpr double kFirstPx = 4;
 
   // Of the last picture:
   std::vector<TraversedCell> const& traversed() const { return traversed_; }
@@ -56,7 +57,7 @@ class LdiRenderer : public Renderer {
   std::size_t uncovered() const { return uncovered_; }
   /// Cells of the tree's file that are damaged, and why: they were left out.
   std::map<std::int32_t, std::string> const& damaged() const { return damaged_; }
-  bool is_complete() const { return postponed_.empty(); }
+  bool is_complete() const { return is_complete_; }
   std::map<std::string, double> const& stages() const { return stages_; }  ///< milliseconds
 
   LdiTree const& tree() const { return *tree_; }
@@ -66,6 +67,8 @@ class LdiRenderer : public Renderer {
   void draw(std::vector<TraversedCell> const& cells);
   std::size_t draw_on(SplatCanvas& canvas, std::vector<CellPart> const& parts, cv::Mat1b const& stencil);
   Frame draw_squares(std::vector<TraversedCell> const& cells);
+  void refine_blended(TraversalOptions how);
+  double next_step_milliseconds(double first) const;
   void fill_gaps(Frame& frame);
   std::pair<int, int> touched(int y) const;
   std::size_t find_gaps(Frame const& frame, cv::Mat1b& stencil);
@@ -79,8 +82,12 @@ class LdiRenderer : public Renderer {
   /// What is drawn for good, and the filtered pixels of cells that were postponed.
   SplatCanvas lasting_, passing_, filling_;
   SquareCanvas squares_;
-  bool has_passing_ = false;
+  bool has_passing_ = false, is_complete_ = false;
+  int steps_ = 0;  ///< done
+  Frame rough_;    ///< what the first made
   double until_px_ = 0;
+  std::vector<double> step_milliseconds_;  ///< of the last picture in steps, and what it took to finish it
+  double finish_milliseconds_ = 0;
   std::vector<TraversedCell> traversed_, postponed_;
   std::size_t splats_ = 0, filling_splats_ = 0, gaps_ = 0, uncovered_ = 0;
   std::map<std::int32_t, std::string> damaged_;

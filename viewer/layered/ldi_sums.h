@@ -10,9 +10,9 @@ namespace scanview {
 /// What has been splatted to one place of a cell: sums of integers, which do not depend on the order of what is summed.
 struct LdiSum {
   std::uint32_t next = 0;                      ///< the next farther one in its column; 0: none
-  std::uint32_t bin = 0;                       ///< depth in grid steps, rounded down
+  std::uint32_t bin = 0;                       ///< depth in bins, rounded down
   std::uint32_t weight = 0;                    ///< kLdiFullWeight: covered once
-  std::uint32_t depth = 0;                     ///< Σ weight · (beyond the bin's start, 1/256 step)
+  std::uint32_t depth = 0;                     ///< Σ weight · (beyond the bin's start, 1/256 bin)
   std::uint64_t red = 0, green = 0, blue = 0;  ///< Σ weight · (linear light, stamp.h)
   std::uint32_t slope_x = 0, slope_y = 0;      ///< Σ weight · (slope · 127 + 128)
 };
@@ -25,7 +25,9 @@ class LdiSums {
   /// Sums of weights above this could overflow: of sixty thousand whole pictures.
   static constexpr std::uint32_t kMostWeight = 0xffffffffU / 256;
 
-  explicit LdiSums(int resolution) : resolution_(static_cast<std::size_t>(resolution)), pool_(1) {}
+  /// Bins are 2^bin_shift grid steps deep.
+  explicit LdiSums(int resolution, int bin_shift = 0)
+      : resolution_(static_cast<std::size_t>(resolution)), bin_shift_(bin_shift), pool_(1) {}
 
   /// The sum at a grid point of a face and a depth bin, made where there is none. Valid until the next call.
   LdiSum& at(int face, int x, int y, std::uint32_t bin);
@@ -38,9 +40,12 @@ class LdiSums {
   bool has_face(int face) const { return !heads_[static_cast<std::size_t>(face)].empty(); }
   std::size_t count() const { return pool_.size() - 1; }
   int resolution() const { return static_cast<int>(resolution_); }
+  int bin_shift() const { return bin_shift_; }
+  int bin_steps() const { return 1 << bin_shift_; }
 
  private:
   std::size_t resolution_;
+  int bin_shift_;
   std::vector<std::uint32_t> heads_[kFaces];
   std::vector<LdiSum> pool_;
 };

@@ -157,7 +157,7 @@ std::string encode_sums(LdiSumCells const& cells) {
   return std::move(out.bytes);
 }
 
-LdiSumCells decode_sums(std::string_view bytes, int resolution, std::filesystem::path const& path) {
+LdiSumCells decode_sums(std::string_view bytes, LdiOptions const& options, std::filesystem::path const& path) {
   Reader in(bytes, path);
   constexpr std::size_t kLeastCellBytes = 4 + LdiSums::kFaces;
   std::uint64_t const count = in.get(in.left() / kLeastCellBytes);
@@ -169,7 +169,7 @@ LdiSumCells decode_sums(std::string_view bytes, int resolution, std::filesystem:
     for (std::int64_t& index : key.index) index = in.get_signed();
     key.level = static_cast<int>(std::clamp<std::int64_t>(level, -kLdiFarthestLevel - 1, kLdiFarthestLevel + 1));
     if (!is_ldi_key(key) || (i > 0 && !in_ldi_order(last, key))) in.refuse();
-    auto sums = std::make_unique<LdiSums>(resolution);
+    auto sums = std::make_unique<LdiSums>(options.resolution, options.bin_shift(key.level));
     for (int face = 0; face < LdiSums::kFaces; ++face) decode_face(in, face, *sums);
     if (sums->count() == 0) in.refuse();
     cells.emplace(key, std::move(sums));

@@ -15,6 +15,6 @@ std::string encode_sums(LdiSumCells const& cells);
 
 /// What encode_sums() gave. Throws Error{bad_input, path} where the bytes are not such sums; counts are
 /// checked against the bytes that are there.
-LdiSumCells decode_sums(std::string_view bytes, int resolution, std::filesystem::path const& path);
+LdiSumCells decode_sums(std::string_view bytes, LdiOptions const& options, std::filesystem::path const& path);
 
 }  // namespace scanview

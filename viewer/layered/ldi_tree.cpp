@@ -46,6 +46,12 @@ void LdiOptions::validate() const {
   check_range(covered, 0, 1, "covered", "0 to 1");
 }
 
+int LdiOptions::bin_shift(int level) const {
+  int shift = 0;
+  while ((2 << shift) <= resolution && ldi_step(level) * (2 << shift) <= depth_error) ++shift;
+  return shift;
+}
+
 double LdiOptions::step_limit() const {
   return smallest_feature > 0 ? ldi_step(static_cast<int>(std::floor(std::log2(smallest_feature)))) : 0;
 }

@@ -31,7 +31,10 @@ struct LdiOptions {
   double covered = 0.5;
   enum class Normals { measured, facing } normals = Normals::measured;  ///< StampOptions
 
-  void validate() const;      ///< Throws Error{usage} naming the field and its range.
+  void validate() const;  ///< Throws Error{usage} naming the field and its range.
+  /// Depth bins of a level are 2^bin_shift steps deep: as deep as the images are uncertain. Noise does not fill bin
+  /// after bin.
+  int bin_shift(int level) const;
   double step_limit() const;  ///< the finest step by smallest_feature; 0: none
   bool operator==(LdiOptions const&) const = default;
 };
