@@ -158,6 +158,16 @@ class Merger {
     return cover / full;
   }
 
+  /// Whether the surface goes on at both sides of a place: what looks like a rim there is noise, and coarser levels,
+  /// which the finer ones around cover, would not fill the hole.
+  bool is_within(int face, int x, int y, double at, double within) {
+    constexpr double kCovered = 0.5;
+    auto const is_covered = [&](int i, int j) {
+      return i < 0 || j < 0 || i >= n_ || j >= n_ || cover_near(own_, face, i, j, at, within, kOwnFull) >= kCovered;
+    };
+    return (is_covered(x - 1, y) && is_covered(x + 1, y)) || (is_covered(x, y - 1) && is_covered(x, y + 1));
+  }
+
   /// Of the rims of surfaces, whose colours may be mixtures and which reach beyond the surface, only those count that
   /// show what no other pixel shows: neither of this level, nor a finer one around, nor of the next two coarser levels.
   bool is_seen_better(Layer const& rim, int face, int x, int y) {
@@ -167,6 +177,7 @@ class Merger {
     for (int j = std::max(0, y - 1); j <= std::min(n_ - 1, y + 1); ++j)
       for (int i = std::max(0, x - 1); i <= std::min(n_ - 1, x + 1); ++i)
         if (cover_near(filtered_, face, i, j, rim.at(), within + 1, kFilteredFull) >= kNear) return true;
+    if (is_within(face, x, y, rim.at(), within)) return false;
     std::size_t const axis = static_cast<std::size_t>(face / 2), b = (axis + 1) % 3, c = (axis + 2) % 3;
     double place_x = x + 0.5, place_y = y + 0.5, depth = rim.at();
     LdiCellKey key = key_;

@@ -104,6 +104,9 @@ SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, 
   // where the axis points away from the camera.
   bool const oriented = tree.options.normals == LdiOptions::Normals::measured;
   transform.facing = !oriented ? 0 : face % 2 == 0 ? 1 : -1;
+  transform.step = static_cast<float>(ldi_step(cell.key.level) * std::sqrt(camera.fx() * camera.fy()));
+  // Of uncertain depths normals are uncertain.
+  transform.doubt = tree.options.depth_error > ldi_step(cell.key.level) ? 1 : 0;
   transform.tolerance = static_cast<float>(tree.merge_distance(cell.key.level));
   transform.near = static_cast<float>(near);
   transform.least = kLeast;

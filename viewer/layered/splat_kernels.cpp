@@ -26,9 +26,10 @@ struct alignas(64) Splats {
   std::int32_t x[16], y[16];
 };
 
-/// Of a kernel, in grid steps as they are on the screen: narrower than the grid, with which it would add up to 1
-/// everywhere, but a third faster and as accurate.
-constexpr float kReach = 0.8F;
+/// Cosines: what a surface covers at least whose normal is in doubt, and how far it may be turned away.
+constexpr float kDoubtedCover = 0.35F, kDoubtedTurn = 0.2F;
+/// How much wider splats of uncertain depths are.
+constexpr float kDoubtedReach = 1.5F;
 /// Whatever is behind so much is not seen.
 constexpr float kOpaque = 0.8F;
 /// A patch is drawn on nothing that is covered so much by another surface.
@@ -48,6 +49,10 @@ HWY_INLINE void AddTo(OutputLayer& layer, Sample const& sample, float weight) {
   __builtin_memcpy(&value, &layer, sizeof value);
   value += sample.sums * weight;
   __builtin_memcpy(&layer, &value, sizeof value);
+}
+
+HWY_INLINE void Join(OutputLayer& layer, OutputLayer const& other) {
+  for (int c = 0; c < OutputLayer::kSums; ++c) layer.sums[c] += other.sums[c];
 }
 
 HWY_INLINE void PutSample(OutputLayer& layer, Sample const& sample, float weight) {
@@ -71,6 +76,7 @@ HWY_NOINLINE void AddBehind(OutputArea const& area, std::size_t at, Sample const
     if (kFills && covered >= kFilled) return;
     if (nearer > 0) {
       int const last = std::min(count, kOutputLayers - 1);
+      if (count == kOutputLayers && k < last) Join(area.layers[last - 1][at], area.layers[last][at]);
       for (int j = last; j > k; --j) area.layers[j][at] = area.layers[j - 1][at];
       PutSample(layer, sample, weight);
       area.counts[at] = static_cast<std::uint8_t>(last + 1);
@@ -78,7 +84,11 @@ HWY_NOINLINE void AddBehind(OutputArea const& area, std::size_t at, Sample const
     }
     if (covered >= kOpaque) return;
   }
-  if (count == kOutputLayers) return;
+  if (count == kOutputLayers) {
+    // Where noise makes many thin layers of a surface, none of what covers the pixel is lost.
+    AddTo(area.layers[kOutputLayers - 1][at], sample, weight);
+    return;
+  }
   PutSample(area.layers[count][at], sample, weight);
   area.counts[at] = static_cast<std::uint8_t>(count + 1);
 }
@@ -213,7 +223,7 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
     // How the screen moves with a grid step along x and along y on the tangent plane.
     auto const step = [&](int row, int column, decltype(x) slope)
                           HWY_ATTR { return hn::Add(m(row, column), hn::Mul(slope, m(row, 2))); };
-    auto const zx = step(2, 0, slope_x), zy = step(2, 1, slope_y);
+    auto zx = step(2, 0, slope_x), zy = step(2, 1, slope_y);
     auto ux = step(0, 0, slope_x), uy = step(0, 1, slope_y), vx = step(1, 0, slope_x), vy = step(1, 1, slope_y);
     if (t.perspective) {
       ux = hn::Mul(hn::Sub(ux, hn::Mul(u, zx)), per_z);
@@ -221,15 +231,29 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
       vx = hn::Mul(hn::Sub(vx, hn::Mul(v, zx)), per_z);
       vy = hn::Mul(hn::Sub(vy, hn::Mul(v, zy)), per_z);
     }
+    auto const square = hn::Mul(hn::Set(d, t.step), per_z);
+    if (t.facing == 0) {
+      ux = vy = square;
+      uy = vx = zx = zy = zero;
+    }
     auto const area_signed = hn::Sub(hn::Mul(ux, vy), hn::Mul(uy, vx));
-    auto const stamp = hn::Abs(area_signed);
-    if (t.facing != 0) valid = hn::And(valid, hn::Gt(hn::Mul(area_signed, hn::Set(d, t.facing)), zero));
+    // Where in doubt, a surface is seen though it is turned away a little, and covers as much as one that is not.
+    auto const facing_area = hn::Mul(hn::Mul(square, square), hn::Set(d, t.doubt));
+    auto const stamp = hn::Max(hn::Abs(area_signed), hn::Mul(facing_area, hn::Set(d, kDoubtedCover)));
+    if (t.facing != 0)
+      valid = hn::And(valid, hn::Gt(hn::Add(hn::Mul(area_signed, hn::Set(d, t.facing)),
+                                            hn::Mul(facing_area, hn::Set(d, kDoubtedTurn))),
+                                    zero));
     auto const widest = hn::Set(d, t.widest);
     auto const least = hn::Set(d, t.least);
-    auto const reach_u = hn::Min(
-        widest, hn::Max(least, hn::Mul(hn::Set(d, kReach), hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy))))));
-    auto const reach_v = hn::Min(
-        widest, hn::Max(least, hn::Mul(hn::Set(d, kReach), hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy))))));
+    auto reach_u = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy)))));
+    auto reach_v = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy)))));
+    auto const share = hn::Min(one, hn::Div(stamp, hn::Mul(reach_u, reach_v)));
+    if (t.doubt != 0) {
+      // Noise has moved what lies around, too: whole surfaces must not have holes.
+      reach_u = hn::Mul(reach_u, hn::Set(d, kDoubtedReach));
+      reach_v = hn::Mul(reach_v, hn::Set(d, kDoubtedReach));
+    }
     valid = hn::And(valid, hn::Gt(hn::Add(u, reach_u), hn::Set(d, float(area.first_x))));
     valid = hn::And(valid, hn::Lt(hn::Sub(u, reach_u), hn::Set(d, float(area.end_x - 1))));
     valid = hn::And(valid, hn::Gt(hn::Add(v, reach_v), hn::Set(d, float(area.first_y))));
@@ -241,8 +265,7 @@ std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t c
       return hn::Mul(hn::Mul(root, root), hn::Set(d, 1.0F / (255.0F * 255.0F)));
     };
     auto const alpha = hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(color))), hn::Set(d, 1.0F / 255));
-    auto const weight =
-        hn::Mul(alpha, hn::Min(hn::Set(d, 1 / (kReach * kReach)), hn::Div(stamp, hn::Mul(reach_u, reach_v))));
+    auto const weight = hn::Mul(alpha, share);
     // Gradient on the screen of the key, whose change with x is −zx / z² (perspective) or −zx.
     auto const per_z2 = hn::Mul(per_z, per_z);
     auto const per_area = hn::Div(one, hn::IfThenElse(hn::Gt(stamp, hn::Set(d, 1e-6F)), area_signed, one));

@@ -34,10 +34,12 @@ struct OutputArea {
 /// u, v and z (orthographic).
 struct SplatTransform {
   float rows[3][4];
-  float depth_scale;    ///< steps in 1/65536 of the cell
-  float facing;         ///< ±1: only surfaces whose grid turns that way on the screen; 0: all
-  float tolerance;      ///< in units of depth
-  float near;           ///< perspective: nothing nearer is drawn
+  float depth_scale;  ///< steps in 1/65536 of the cell
+  float facing;     ///< ±1: only surfaces whose grid turns that way on the screen; 0: all, as if they faced the camera
+  float step;       ///< a grid step that faces the camera, in pixels (times z: perspective)
+  float doubt;      ///< 0: normals are exact; 1: surfaces may be turned more to the camera than they say
+  float tolerance;  ///< in units of depth
+  float near;       ///< perspective: nothing nearer is drawn
   float least, widest;  ///< reach of a splat, in pixels
   bool perspective;
   bool fills;  ///< a layer takes no more than what it lacks to be covered once
