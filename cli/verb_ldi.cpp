@@ -195,6 +195,10 @@ void add_splat_options(CLI::App* part, LdiRenderOptions& options) {
       {"filled", LdiRenderOptions::Gaps::filled}, {"background", LdiRenderOptions::Gaps::background}};
   part->add_option("--gaps", options.gaps, "filled (from coarser cells), background (transparent)")
       ->transform(CLI::CheckedTransformer(kGaps));
+  static std::map<std::string, LdiRenderOptions::Splats> const kSplats = {
+      {"blended", LdiRenderOptions::Splats::blended}, {"squares", LdiRenderOptions::Splats::squares}};
+  part->add_option("--splats", options.splats, "blended, or squares: the nearest wins, faster and rougher")
+      ->transform(CLI::CheckedTransformer(kSplats));
 }
 
 }  // namespace
