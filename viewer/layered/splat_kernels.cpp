@@ -95,14 +95,15 @@ HWY_NOINLINE void AddBehind(OutputArea const& area, std::size_t at, Sample const
 
 template <bool kFills>
 HWY_INLINE void AddSample(OutputArea const& area, std::size_t at, Sample const& sample, float weight) {
-  if (!kFills && area.counts[at] != 0) {
+  if (area.counts[at] != 0) {
     OutputLayer& layer = area.layers[0][at];
     float const covered = layer.sums[OutputLayer::weight];
     float const nearer = sample.key * covered - layer.sums[OutputLayer::key];
     if (std::abs(nearer) <= std::max(sample.tolerance, layer.tolerance) * covered) {
-      AddTo(layer, sample, weight);
+      AddTo(layer, sample, kFills ? std::min(weight, std::max(0.0F, 1 - covered)) : weight);
       return;
     }
+    if (kFills && covered >= kFilled) return;
     if (nearer < 0 && covered >= kOpaque) return;
   }
   AddBehind<kFills>(area, at, sample, weight);
