@@ -29,7 +29,7 @@ struct alignas(64) Splats {
 /// Cosines: what a surface covers at least whose normal is in doubt, and how far it may be turned away.
 constexpr float kDoubtedCover = 0.35F, kDoubtedTurn = 0.2F;
 /// How much wider splats of uncertain depths are.
-constexpr float kDoubtedReach = 1.5F;
+constexpr float kDoubtedReach = 2;
 /// Whatever is behind so much is not seen.
 constexpr float kOpaque = 0.8F;
 /// A patch is drawn on nothing that is covered so much by another surface.
