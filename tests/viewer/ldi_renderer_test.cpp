@@ -350,7 +350,7 @@ TEST(LdiGaps, UncoveredCountsThePixelsThatAre) {
   // Also from where the wall is a part of the picture.
   Camera const wide = Camera::orthographic(kWall, kWall, 1.9 * kPixel, 1.9 * kPixel, 40, 50);
   for (Camera const& camera : {view.image.camera, wide})
-    for (double const covered : {0.1, 0.25, 0.5})
+    for (double const covered : {0.1, 0.25, 0.5, 0.8, 1.0})
       for (Gaps const gaps : {Gaps::background, Gaps::filled}) {
         LdiRenderer renderer(tree, with(gaps, covered));
         Frame const frame = renderer.render(camera, *view.object_from_camera);
