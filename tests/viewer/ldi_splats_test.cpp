@@ -259,6 +259,23 @@ TEST(LdiBlended, NothingShinesThroughAPlane) {
   EXPECT_GT(count, 20);
 }
 
+TEST(LdiBlended, NothingShinesThroughAPlaneHoweverItsGridsLie) {
+  // Turned and foreshortened on the screen, and where a coarser grid meets a finer one: what is covered is opaque.
+  Vector3d const rear = kMiddle - 16 * kStep * Vector3d::UnitZ();
+  auto const tree = shared_tree({panel_view(Vector3d::UnitZ(), kMiddle, 16, kSpacing, plain_paint(kFront)),
+                                 panel_view(Vector3d::UnitZ(), rear, 24, kSpacing, plain_paint(kRear))});
+  for_each_view([&](double tilt, double step_px, double stamp_px) {
+    double most = 0;
+    for (double const roll : {0.0, 20.0, 45.0})
+      most = std::max(
+          most,
+          color_error(
+              LdiRenderer(tree, with(Splats::blended, stamp_px)).render(small_camera(), oblique(tilt, roll, step_px)),
+              kFront));
+    EXPECT_LE(most, kExact);
+  });
+}
+
 TEST(LdiSplats, OutlinesLieWhereTheyAre) {
   // A front square before a rear plane. Where a row of the picture turns from one's colour to the other's: by shares of
   // the red channel in linear light, of which the rear has none.
