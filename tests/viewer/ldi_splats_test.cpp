@@ -103,6 +103,21 @@ TEST(LdiSquares, CoverAPlaneInItsColour) {
   });
 }
 
+TEST(LdiSquares, CoverAPlaneHoweverItsGridLies) {
+  // Turned on the screen, and on planes that are turned from the face that they lie on: by 45 degrees at most.
+  for (Vector3d const& direction : {Vector3d(0, 0, 1), Vector3d(0, 0.5, 1), Vector3d(0, 0.95, 1)}) {
+    Vector3d const normal = direction.normalized();
+    auto const tree = shared_tree({panel_view(normal, kMiddle, 8, kSpacing, plain_paint(kFront))});
+    for (double const roll : {0.0, 20.0, 45.0})
+      for (double const step_px : {1.0, 2.0}) {
+        Eigen::Isometry3d pose = toward(kMiddle + kStep * 128 / step_px * normal, kMiddle);
+        pose.linear() *= Eigen::AngleAxisd(roll * std::numbers::pi / 180, Vector3d::UnitZ()).toRotationMatrix();
+        EXPECT_EQ(uncovered(LdiRenderer(tree, with(Splats::squares)).render(small_camera(), pose)), 0U)
+            << direction.transpose() << ", rolled by " << roll << ", steps of " << step_px << " px";
+      }
+  }
+}
+
 TEST(LdiSquares, OfTwoPlanesTheNearerIsSeen) {
   // A square counts as up to 4 steps farther at its edge, 8 at its corner: from where stamps of 2 px are drawn, steps
   // are twice as long.
