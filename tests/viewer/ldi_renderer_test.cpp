@@ -365,8 +365,8 @@ TEST(LdiGaps, AnOutlineHasNoHalo) {
   View const view = wall_view(false);
   for (int const resolution : {8, 64}) {
     auto const tree = shared_tree({view}, resolution);
-    // As large as the reference, and smaller.
-    for (double const zoom : {0.5, 0.8, 1.0}) {
+    // As large as the reference, and up to half and twice as large.
+    for (double const zoom : {0.5, 0.8, 1.0, 2.0}) {
       int const size = static_cast<int>(2 * zoom * kWall);
       double const spacing = kPixel / zoom, center = (size - 1) / 2.0;
       Camera const camera = Camera::orthographic(size, size, spacing, spacing, center, center);
