@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "base/srgb.h"
+
 namespace scanview::test {
 
 PlanePaint plain_paint(cv::Vec3b const& color) {
@@ -49,6 +51,44 @@ View plane_view(std::string const& name, Camera const& camera, Eigen::Isometry3d
       view.image.color(y, x) = paint(origin + z * ray);
     }
   return view;
+}
+
+View panel_view(Eigen::Vector3d const& normal, Eigen::Vector3d const& middle, double half, double spacing,
+                PlanePaint const& paint) {
+  int const size = static_cast<int>(std::lround(2 * half / spacing));
+  double const center = (size - 1) / 2.0;
+  return plane_view("panel", Camera::orthographic(size, size, spacing, spacing, center, center),
+                    toward(middle + 50 * normal, middle), normal, normal.dot(middle), paint);
+}
+
+View nearest_of(std::vector<View> const& views) {
+  View all = views[0];
+  for (View const& view : views)
+    for (int y = 0; y < all.image.depth.rows; ++y)
+      for (int x = 0; x < all.image.depth.cols; ++x) {
+        if (!view.image.has_depth(x, y)) continue;
+        if (all.image.has_depth(x, y) && all.image.depth(y, x) <= view.image.depth(y, x)) continue;
+        all.image.depth(y, x) = view.image.depth(y, x);
+        all.image.sigma(y, x) = view.image.sigma(y, x);
+        all.image.classes(y, x) = view.image.classes(y, x);
+        all.image.color(y, x) = view.image.color(y, x);
+      }
+  return all;
+}
+
+View corner_view(std::string const& name, int size, Eigen::Vector3d const& eye) {
+  Camera const camera = square_view(size);
+  Eigen::Isometry3d const pose = toward(eye, {-2, -1.5, -2});
+  std::vector<View> planes;
+  Eigen::Vector3d const offsets(-2, -1.5, -2);
+  for (int k = 0; k < 3; ++k)
+    planes.push_back(plane_view(name, camera, pose, Eigen::Vector3d::Unit(k), offsets[k], wavy_paint(1.5)));
+  return nearest_of(planes);
+}
+
+double kept(int srgb) {
+  double const root = std::round(255 * std::sqrt(linear_from_srgb8()[static_cast<std::size_t>(srgb)]));
+  return 255 * srgb_from_linear(root * root / (255.0 * 255.0));
 }
 
 View pixel_view(Camera const& camera, Eigen::Isometry3d const& object_from_camera, float depth,

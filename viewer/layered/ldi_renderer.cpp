@@ -16,6 +16,11 @@ double now() {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+/// Of a pixel that is no gap.
+std::uint32_t least_alpha(LdiRenderOptions const& options) {
+  return static_cast<std::uint32_t>(std::ceil(255 * options.covered));
+}
+
 }  // namespace
 
 void LdiRenderOptions::validate() const {
@@ -116,8 +121,7 @@ Frame LdiRenderer::picture() {
   double start = begun;
   Frame frame;
   filling_splats_ = 0;
-  gaps_ = uncovered_ =
-      lasting_.compose(has_passing_ ? &passing_ : nullptr, static_cast<float>(options.covered), frame, context_);
+  gaps_ = uncovered_ = lasting_.compose(has_passing_ ? &passing_ : nullptr, least_alpha(options), frame, context_);
   stages_["compose"] += now() - start;
   start = now();
   fill_gaps(frame);
@@ -193,7 +197,7 @@ std::pair<int, int> LdiRenderer::touched(int y) const {
 /// there are.
 std::size_t LdiRenderer::find_gaps(Frame const& frame, cv::Mat1b& stencil) {
   stencil.create(frame.color.size());
-  auto const least = static_cast<uchar>(std::ceil(255 * options.covered));
+  std::uint32_t const least = least_alpha(options);
   std::atomic<std::size_t> gaps = 0;
   for_each_rows(stencil.rows, [&](int y) {
     auto const [left, right] = touched(y);

@@ -279,7 +279,8 @@ std::size_t SplatCanvas::draw(LdiTree const& tree, std::vector<CellPart> const& 
   return splats;
 }
 
-std::size_t SplatCanvas::compose(SplatCanvas const* more, float covered, Frame& frame, Context& context) const {
+std::size_t SplatCanvas::compose(SplatCanvas const* more, std::uint32_t least_alpha, Frame& frame,
+                                 Context& context) const {
   frame.color.create(camera_.height(), camera_.width());
   frame.depth.create(camera_.height(), camera_.width());
   std::atomic<std::size_t> bare = 0;
@@ -307,7 +308,7 @@ std::size_t SplatCanvas::compose(SplatCanvas const* more, float covered, Frame& 
       count += static_cast<std::size_t>(camera_.width() - (right - left));
       if (left < right)
         count += compose_splats(mine, second != nullptr ? &others : nullptr, y, left, right, camera_.is_perspective(),
-                                covered, row);
+                                least_alpha, row);
     }
     bare += count;
   });

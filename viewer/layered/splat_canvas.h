@@ -36,8 +36,8 @@ class SplatCanvas {
   /// Cells that the last draw() left out, and why (LdiTree::blocks).
   std::map<std::int32_t, std::string> const& damaged() const { return damaged_; }
   /// The layers composed from the front (§3.3), of this canvas and, where there is one, of another that was begun for
-  /// the same camera. Returns the number of pixels that are covered less than `covered`.
-  std::size_t compose(SplatCanvas const* more, float covered, Frame& frame, Context& context) const;
+  /// the same camera. Returns the number of pixels whose alpha is less than `least_alpha`.
+  std::size_t compose(SplatCanvas const* more, std::uint32_t least_alpha, Frame& frame, Context& context) const;
   /// Columns [first, second) of a row in which something may have been drawn.
   std::pair<int, int> touched(int y) const {
     Touched const& band = touched_[static_cast<std::size_t>(y / kBand)];

@@ -372,7 +372,8 @@ class MergedLayers {
 };
 
 std::size_t ComposeSplats(OutputArea const& area, OutputArea const* more, int y, int begin, int end, bool perspective,
-                          float covered, std::uint32_t const* encode, float encode_steps, PictureRow const& out) {
+                          std::uint32_t least_alpha, std::uint32_t const* encode, float encode_steps,
+                          PictureRow const& out) {
   Floats const d;
   hn::Rebind<std::int32_t, Floats> const di;
   hn::Rebind<std::uint32_t, Floats> const du;
@@ -425,7 +426,7 @@ std::size_t ComposeSplats(OutputArea const& area, OutputArea const* more, int y,
     hn::Store(perspective ? hn::Div(hn::Set(d, 1.0F), key) : hn::Neg(key), d, depth);
     for (int i = 0; i < count; ++i) {
       if (stencil != nullptr && stencil[x + i - area.left] == 0) continue;
-      bare += coverage[i] < covered;
+      bare += pixels[i] >> 24 < least_alpha;
       if (stencil != nullptr && pixels[i] == 0) continue;
       out.color[x + i] = pixels[i];
       out.depth[x + i] = pixels[i] == 0 ? missing : depth[i];
@@ -450,8 +451,8 @@ std::size_t draw_splats(LdiPixels const& pixels, std::size_t first, std::size_t 
 }
 
 std::size_t compose_splats(OutputArea const& area, OutputArea const* more, int y, int begin, int end, bool perspective,
-                           float covered, PictureRow const& out) {
-  return HWY_DYNAMIC_DISPATCH(ComposeSplats)(area, more, y, begin, end, perspective, covered, encode_table().data(),
+                           std::uint32_t least_alpha, PictureRow const& out) {
+  return HWY_DYNAMIC_DISPATCH(ComposeSplats)(area, more, y, begin, end, perspective, least_alpha, encode_table().data(),
                                              float(kEncodeSteps), out);
 }
 

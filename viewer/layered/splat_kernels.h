@@ -60,8 +60,8 @@ struct PictureRow {
 /// Composes the layers of pixels [begin, end) of row y from the front: layers that are opaque together hide the rest;
 /// depth is that of the one which shows most. Two buffers may be composed as one (`more`, may be null). Pixels without
 /// layers get color 0 and depth NaN; with the area's stencil only where it is not 0 anything is written. Returns the
-/// number of pixels whose coverage is below `covered`, of those written.
+/// number of pixels whose alpha is less than `least_alpha`, of those written.
 std::size_t compose_splats(OutputArea const& area, OutputArea const* more, int y, int begin, int end, bool perspective,
-                           float covered, PictureRow const& out);
+                           std::uint32_t least_alpha, PictureRow const& out);
 
 }  // namespace scanview
