@@ -324,5 +324,50 @@ TEST(LdiPictures, InStepsCountWhatIsUncoveredAtEachStep) {
   EXPECT_GT(steps, 2);
 }
 
+bool equal(Frame const& a, Frame const& b) {
+  return a.color.size() == b.color.size() && std::equal(a.color.begin(), a.color.end(), b.color.begin()) &&
+         std::equal(a.depth.begin(), a.depth.end(), b.depth.begin(),
+                    [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); });
+}
+
+TEST(LdiPictures, MayBeAskedForAndPaintedOnAtAnyTime) {
+  Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
+  LdiOptions options;
+  options.resolution = 8;
+  LdiRenderer renderer(std::make_shared<LdiTree>(tree_of({slanted(square_view(64), pose)}, options)), {});
+  EXPECT_FALSE(renderer.refine());
+  EXPECT_TRUE(renderer.picture().color.empty());
+  Camera const camera = square_view(90);
+  renderer.begin(camera, pose);
+  EXPECT_EQ(cv::countNonZero(renderer.picture().depth > 0), 0);
+  for (bool more = true; more;) {
+    more = renderer.refine();
+    Frame first = renderer.picture();
+    Frame const copy{first.color.clone(), first.depth.clone()};
+    first.color.setTo(cv::Scalar(255, 0, 255, 255));
+    EXPECT_TRUE(equal(renderer.picture(), copy));
+  }
+  Frame const blended = renderer.picture();
+  // What has been drawn stays, whatever the next picture is to be drawn with.
+  renderer.options.splats = LdiRenderOptions::Splats::squares;
+  EXPECT_FALSE(renderer.refine());
+  EXPECT_TRUE(equal(renderer.picture(), blended));
+  Frame const squares = renderer.render(camera, pose);
+  EXPECT_FALSE(equal(squares, blended));
+  EXPECT_TRUE(equal(renderer.picture(), squares));
+  EXPECT_EQ(renderer.filling_splats(), 0U);
+  renderer.options.splats = LdiRenderOptions::Splats::blended;
+  EXPECT_TRUE(equal(renderer.picture(), squares));
+  // From blended ones to squares on the way.
+  renderer.begin(camera, pose);
+  renderer.refine();
+  ASSERT_TRUE(renderer.refine());
+  renderer.picture();
+  renderer.options.splats = LdiRenderOptions::Splats::squares;
+  EXPECT_FALSE(renderer.refine());
+  EXPECT_TRUE(equal(renderer.picture(), squares));
+  EXPECT_EQ(renderer.filling_splats(), 0U);
+}
+
 }  // namespace
 }  // namespace scanview::test

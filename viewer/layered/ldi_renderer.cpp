@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -46,7 +47,7 @@ void LdiRenderer::begin(Camera const& camera, Eigen::Isometry3d const& object_fr
   damaged_.clear();
   until_px_ = 0;
   steps_ = 0;
-  is_complete_ = false;
+  is_complete_ = is_rough_ = false;
   stages_.clear();
 }
 
@@ -71,6 +72,7 @@ void LdiRenderer::draw(std::vector<TraversedCell> const& cells) {
     }
   }
   traversed_.insert(traversed_.end(), cells.begin(), cells.end());
+  is_rough_ = false;
   is_complete_ = postponed_.empty();
   if (is_complete_)
     for (TraversedCell const& at : traversed_) lasting.push_back({at.cell, LdiKind::patch});
@@ -116,7 +118,9 @@ void LdiRenderer::refine_blended(TraversalOptions how) {
 }
 
 Frame LdiRenderer::picture() {
-  if (steps_ == 1 || (steps_ > 0 && options.splats == LdiRenderOptions::Splats::squares)) return rough_;
+  // A caller may paint on what it got: asked again, squares are drawn again.
+  if (is_rough_ && rough_.color.empty()) rough_ = draw_squares(std::vector<TraversedCell>(traversed_));
+  if (is_rough_) return std::exchange(rough_, {});
   double const begun = now();
   double start = begun;
   Frame frame;
@@ -140,6 +144,7 @@ Frame LdiRenderer::render(Camera const& camera, Eigen::Isometry3d const& object_
   start = now();
   if (options.splats == LdiRenderOptions::Splats::squares) {
     Frame frame = draw_squares(cells);
+    rough_ = {};
     is_complete_ = true;
     stages_["draw"] = now() - start;
     return frame;
@@ -157,6 +162,8 @@ Frame LdiRenderer::draw_squares(std::vector<TraversedCell> const& cells) {
     parts.push_back({at.cell, LdiKind::patch});
   }
   traversed_ = cells;
+  is_rough_ = true;
+  filling_splats_ = 0;
   Frame frame;
   splats_ = squares_.draw(*tree_, parts, camera_, object_from_camera_, frame, context_);
   damaged_ = squares_.damaged();

@@ -40,7 +40,8 @@ class LdiRenderer : public Renderer {
   /// A picture in steps (§3.4): begin(), then refine() until it says that nothing is left. The first step is of
   /// squares, of cells whose steps are kFirstPx pixels on the screen: a tenth of the whole. Then blended splats of
   /// these cells, and in each following step of cells of half as many pixels; what has been drawn for good is not drawn
-  /// again. picture() at any time.
+  /// again. Splats::squares takes two steps. picture() at any time: what the last step made; empty before begin(), when
+  /// nothing is left to refine either.
   void begin(Camera const& camera, Eigen::Isometry3d const& object_from_camera);
   bool refine();
   Frame picture();
@@ -82,9 +83,10 @@ class LdiRenderer : public Renderer {
   /// What is drawn for good, and the filtered pixels of cells that were postponed.
   SplatCanvas lasting_, passing_, filling_;
   SquareCanvas squares_;
-  bool has_passing_ = false, is_complete_ = false;
-  int steps_ = 0;  ///< done
-  Frame rough_;    ///< what the first made
+  bool has_passing_ = false, is_complete_ = true;
+  int steps_ = 0;          ///< done
+  bool is_rough_ = false;  ///< what has been drawn are squares
+  Frame rough_;            ///< of these, until picture() hands it out
   double until_px_ = 0;
   std::vector<double> step_milliseconds_;  ///< of the last picture in steps, and what it took to finish it
   double finish_milliseconds_ = 0;

@@ -45,10 +45,7 @@ cv::Mat4b ViewedTree::render(Camera const& camera, Eigen::Isometry3d const& obje
 
 void ViewedTree::take_steps(bool goes_on, double milliseconds) {
   if (!goes_on && milliseconds > 0) {
-    // Steps are judged, but not what follows them: it takes about as long as the last time.
-    double const rest = std::max(0.0, milliseconds - finishing_milliseconds_);
-    shown_.frame = renderer_.render_within(rest, shown_.camera, shown_.object_from_camera);
-    finishing_milliseconds_ = renderer_.stages().at("compose") + renderer_.stages().at("fill");
+    shown_.frame = renderer_.render_within(milliseconds, shown_.camera, shown_.object_from_camera);
     return;
   }
   if (!goes_on) renderer_.begin(shown_.camera, shown_.object_from_camera);

@@ -56,7 +56,6 @@ class ViewedTree {
   ShownFrame shown_;
   TreeFigures figures_;
   std::vector<std::string> failures_;
-  double finishing_milliseconds_ = 0;  ///< after the steps of the last picture that was begun
 };
 
 }  // namespace scanview
