@@ -331,12 +331,36 @@ constexpr float kGain = 1.25F;
 /// What is left to be seen below this is nothing.
 constexpr float kNothing = 0.002F;
 
+/// Whether a pixel's first layer goes on in all pixels beside it: then it is whole, though kernels on a grid that is
+/// turned or foreshortened may not add up to 1 there. What is in another area does not count.
+HWY_INLINE bool IsWithin(OutputArea const& area, std::size_t at, int x, int y) {
+  OutputLayer const& here = area.layers[0][at];
+  float const weight = here.sums[OutputLayer::weight];
+  // Beyond an outline weights fall off within a pixel or two.
+  constexpr float kInner = 0.35F;
+  if (weight < kInner) return false;
+  auto const goes_on = [&](bool is_there, std::ptrdiff_t step) {
+    if (!is_there) return true;
+    std::size_t const other = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(at) + step);
+    if (area.counts[other] == 0) return false;
+    OutputLayer const& layer = area.layers[0][other];
+    float const other_weight = layer.sums[OutputLayer::weight];
+    if (other_weight < kInner) return false;
+    // Tolerances are of depths within half a pixel.
+    float const most = 2 * std::max(here.tolerance, layer.tolerance);
+    return std::abs(here.sums[OutputLayer::key] * other_weight - layer.sums[OutputLayer::key] * weight) <=
+           most * weight * other_weight;
+  };
+  return goes_on(x > area.left, -1) && goes_on(x + 1 < area.right, 1) && goes_on(y > area.top, -area.stride) &&
+         goes_on(y + 1 < area.bottom, area.stride);
+}
+
 struct Mixed {
   float sums[8] = {};  ///< of OutputLayer, as shares
   float left = 1, most = 0, key = 0;
-  void Add(OutputLayer const& layer) {
+  HWY_INLINE void Add(OutputLayer const& layer, float gain = kGain) {
     float const weight = layer.sums[OutputLayer::weight];
-    float const share = left * std::min(1.0F, kGain * weight), scale = share / weight;
+    float const share = left * std::min(1.0F, gain * weight), scale = share / weight;
     for (int c = 0; c < 4; ++c) sums[c] += scale * layer.sums[c];
     left -= share;
     if (share > most) most = share, key = layer.sums[OutputLayer::key] / weight;
@@ -401,7 +425,12 @@ std::size_t ComposeSplats(OutputArea const& area, OutputArea const* more, int y,
         while (mixed.left > kNothing && layers.Next(&layer)) mixed.Add(layer);
       } else {
         int const layers = area.counts[at];
-        for (int k = 0; k < layers && mixed.left > kNothing; ++k) mixed.Add(area.layers[k][at]);
+        for (int k = 0; k < layers && mixed.left > kNothing; ++k) {
+          OutputLayer const& layer = area.layers[k][at];
+          float const weight = layer.sums[OutputLayer::weight];
+          bool const is_whole = k == 0 && kGain * weight < 1 && IsWithin(area, at, x + i, y);
+          mixed.Add(layer, is_whole ? 1 / weight : kGain);
+        }
       }
       if (!(mixed.most > 0)) continue;
       coverage[i] = 1 - mixed.left;
