@@ -369,5 +369,28 @@ TEST(LdiPictures, MayBeAskedForAndPaintedOnAtAnyTime) {
   EXPECT_EQ(renderer.filling_splats(), 0U);
 }
 
+TEST(LdiPictures, OfSquaresHaveTheDepthOfWhatTheyShow) {
+  Camera const camera = square_view(64);
+  Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
+  View const view = slanted(camera, pose);
+  LdiRenderOptions options;
+  options.splats = LdiRenderOptions::Splats::squares;
+  LdiRenderer renderer(std::make_shared<LdiTree>(tree_of({view})), options);
+  Frame const frame = renderer.render(camera, pose);
+  double behind = 0, drawn = 0;
+  for (int y = 3; y < 61; ++y)
+    for (int x = 3; x < 61; ++x) {
+      if (frame.color(y, x)[3] == 0) continue;
+      // A square's middle is at most a pixel away, along both axes, on a plane that rises by its pixels' size or less.
+      double const off = double(frame.depth(y, x) - view.image.depth(y, x)),
+                   pixel = camera.pixel_size(double(view.image.depth(y, x)));
+      EXPECT_LT(std::abs(off), 2 * pixel) << x << ' ' << y;
+      behind += off / pixel;
+      ++drawn;
+    }
+  EXPECT_GT(drawn, 3000);
+  EXPECT_NEAR(behind / drawn, 0, 0.1);
+}
+
 }  // namespace
 }  // namespace scanview::test
