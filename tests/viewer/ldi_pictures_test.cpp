@@ -13,6 +13,7 @@
 #include "viewer/layered/ldi_file.h"
 #include "viewer/layered/ldi_renderer.h"
 #include "viewer/ldi_scenes.h"
+#include "viewer/raster/kernels.h"
 
 // Hard cases, seen in pictures.
 
@@ -367,6 +368,60 @@ TEST(LdiPictures, MayBeAskedForAndPaintedOnAtAnyTime) {
   EXPECT_FALSE(renderer.refine());
   EXPECT_TRUE(equal(renderer.picture(), squares));
   EXPECT_EQ(renderer.filling_splats(), 0U);
+}
+
+TEST(LdiPictures, OfSquaresHaveTheDepthOfWhatTheyShow) {
+  Camera const camera = square_view(64);
+  Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
+  View const view = slanted(camera, pose);
+  LdiRenderOptions options;
+  options.splats = LdiRenderOptions::Splats::squares;
+  LdiRenderer renderer(std::make_shared<LdiTree>(tree_of({view})), options);
+  Frame const frame = renderer.render(camera, pose);
+  double behind = 0, drawn = 0;
+  for (int y = 3; y < 61; ++y)
+    for (int x = 3; x < 61; ++x) {
+      if (frame.color(y, x)[3] == 0) continue;
+      // A square's middle is at most a pixel away, along both axes, on a plane that rises by its pixels' size or less.
+      double const off = double(frame.depth(y, x) - view.image.depth(y, x)),
+                   pixel = camera.pixel_size(double(view.image.depth(y, x)));
+      EXPECT_LT(std::abs(off), 2 * pixel) << x << ' ' << y;
+      behind += off / pixel;
+      ++drawn;
+    }
+  EXPECT_GT(drawn, 3000);
+  EXPECT_NEAR(behind / drawn, 0, 0.1);
+}
+
+TEST(LdiPictures, AreEqualOnAnyThreadsAndInstructions) {
+  struct AllTargets {
+    ~AllTargets() { use_kernel_target(""); }
+  } const all_targets;
+  // Rough surfaces, so that pixels' splats reach by turns more and less than a pixel; in cells of which several bands
+  // have a part.
+  constexpr std::uint64_t kSeed = 3;
+  std::vector<View> views;
+  for (int i = 0; i < 3; ++i) {
+    views.push_back(slanted(square_view(64), toward({0.3 + 0.2 * i, 0.2, 1}, {0, 0, -2})));
+    CounterRandom random(kSeed, static_cast<std::uint64_t>(i));
+    for (float& z : views.back().image.depth) z *= static_cast<float>(1 + 0.02 * random.uniform());
+  }
+  auto const tree = std::make_shared<LdiTree>(tree_of(views));
+  Eigen::Isometry3d const pose = toward({0.3, 0.2, 1}, {0, 0, -2});
+  for (Camera const& camera :
+       {square_view(65), square_view(80), square_view(150), Camera::orthographic(126, 97, 0.02, 0.03, 63, 48)})
+    for (auto const splats : {LdiRenderOptions::Splats::blended, LdiRenderOptions::Splats::squares}) {
+      LdiRenderOptions options;
+      options.splats = splats;
+      Frame const expected = LdiRenderer(tree, options, 1).render(camera, pose);
+      for (char const* const target : kernel_targets()) {
+        use_kernel_target(target);
+        for (int const threads : {1, 2, 3})
+          EXPECT_TRUE(equal(LdiRenderer(tree, options, threads).render(camera, pose), expected))
+              << target << ' ' << camera.width() << ' ' << threads;
+      }
+      use_kernel_target("");
+    }
 }
 
 }  // namespace

@@ -17,7 +17,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::CappedTag<float, 16>;
 
-/// What is known of a vector of splats.
+constexpr std::size_t kGroup = 16;  // of splats that are drawn together
+
+/// What is known of a group of splats.
 struct alignas(64) Splats {
   float u[16], v[16], key[16], key_u[16], key_v[16], reach_u[16], reach_v[16], weight[16], red[16], green[16], blue[16],
       tolerance[16];
@@ -188,139 +190,156 @@ HWY_INLINE std::uint32_t MaskBits(D d, Mask mask) {
   return std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8;
 }
 
-std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t count, SplatTransform const& t,
-                       OutputArea const& area) {
+/// Those of a group that are to be drawn, a bit each: such that reach less than a pixel, and others.
+struct Drawn {
+  std::uint32_t small = 0, wide = 0;
+};
+
+/// Places a vector of pixels, of which `count` are there, from `lane` of the group on.
+HWY_INLINE Drawn PlaceSplats(LdiPixels const& pixels, std::size_t i, std::size_t count, SplatTransform const& t,
+                             OutputArea const& area, std::size_t lane, Splats& s) {
   Floats const d;
   hn::Rebind<std::int32_t, Floats> const di;
   hn::Rebind<std::uint32_t, Floats> const du;
   hn::Rebind<std::uint8_t, Floats> const du8;
   hn::Rebind<std::int8_t, Floats> const di8;
   hn::Rebind<std::uint16_t, Floats> const du16;
-  std::size_t const lanes = hn::Lanes(d);
   auto const one = hn::Set(d, 1.0F), half = hn::Set(d, 0.5F), zero = hn::Zero(d);
   auto const m = [&](int row, int column) HWY_ATTR { return hn::Set(d, t.rows[row][column]); };
+  auto const x = hn::Add(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du8, pixels.x + i))), half);
+  auto const y = hn::Add(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du8, pixels.y + i))), half);
+  auto const z =
+      hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du16, pixels.depth + i))), hn::Set(d, t.depth_scale));
+  auto const scale = hn::Set(d, 1.0F / float(kLdiSlope));
+  auto const slope_x = hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(di8, pixels.slope_x + i))), scale);
+  auto const slope_y = hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(di8, pixels.slope_y + i))), scale);
+  auto const place = [&](int row) HWY_ATTR {
+    return hn::Add(hn::Add(hn::Mul(m(row, 0), x), hn::Mul(m(row, 1), y)), hn::Add(hn::Mul(m(row, 2), z), m(row, 3)));
+  };
+  auto const pu = place(0), pv = place(1), depth = place(2);
+  auto valid = hn::FirstN(d, count);
+  auto per_z = one;
+  if (t.perspective) {
+    valid = hn::And(valid, hn::Gt(depth, hn::Set(d, t.near)));
+    per_z = hn::Div(one, hn::Max(depth, hn::Set(d, t.near)));
+  }
+  auto const u = hn::Mul(pu, per_z), v = hn::Mul(pv, per_z);
+  // How the screen moves with a grid step along x and along y on the tangent plane.
+  auto const step = [&](int row, int column, decltype(x) slope)
+                        HWY_ATTR { return hn::Add(m(row, column), hn::Mul(slope, m(row, 2))); };
+  auto zx = step(2, 0, slope_x), zy = step(2, 1, slope_y);
+  auto ux = step(0, 0, slope_x), uy = step(0, 1, slope_y), vx = step(1, 0, slope_x), vy = step(1, 1, slope_y);
+  if (t.perspective) {
+    ux = hn::Mul(hn::Sub(ux, hn::Mul(u, zx)), per_z);
+    uy = hn::Mul(hn::Sub(uy, hn::Mul(u, zy)), per_z);
+    vx = hn::Mul(hn::Sub(vx, hn::Mul(v, zx)), per_z);
+    vy = hn::Mul(hn::Sub(vy, hn::Mul(v, zy)), per_z);
+  }
+  auto const square = hn::Mul(hn::Set(d, t.step), per_z);
+  if (t.facing == 0) {
+    ux = vy = square;
+    uy = vx = zx = zy = zero;
+  }
+  auto const area_signed = hn::Sub(hn::Mul(ux, vy), hn::Mul(uy, vx));
+  // Where in doubt, a surface is seen though it is turned away a little, and covers as much as one that is not.
+  auto const facing_area = hn::Mul(hn::Mul(square, square), hn::Set(d, t.doubt));
+  auto const stamp = hn::Max(hn::Abs(area_signed), hn::Mul(facing_area, hn::Set(d, kDoubtedCover)));
+  if (t.facing != 0)
+    valid = hn::And(valid, hn::Gt(hn::Add(hn::Mul(area_signed, hn::Set(d, t.facing)),
+                                          hn::Mul(facing_area, hn::Set(d, kDoubtedTurn))),
+                                  zero));
+  auto const widest = hn::Set(d, t.widest);
+  auto const least = hn::Set(d, t.least);
+  auto reach_u = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy)))));
+  auto reach_v = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy)))));
+  auto const share = hn::Min(one, hn::Div(stamp, hn::Mul(reach_u, reach_v)));
+  if (t.doubt != 0) {
+    // Noise has moved what lies around, too: whole surfaces must not have holes.
+    reach_u = hn::Mul(reach_u, hn::Set(d, kDoubtedReach));
+    reach_v = hn::Mul(reach_v, hn::Set(d, kDoubtedReach));
+  }
+  valid = hn::And(valid, hn::Gt(hn::Add(u, reach_u), hn::Set(d, float(area.first_x))));
+  valid = hn::And(valid, hn::Lt(hn::Sub(u, reach_u), hn::Set(d, float(area.end_x - 1))));
+  valid = hn::And(valid, hn::Gt(hn::Add(v, reach_v), hn::Set(d, float(area.first_y))));
+  valid = hn::And(valid, hn::Lt(hn::Sub(v, reach_v), hn::Set(d, float(area.end_y - 1))));
+  if (hn::AllFalse(d, valid)) return {};
+  auto const color = hn::LoadU(du, pixels.color + i);
+  auto const channel = [&](auto bits) HWY_ATTR {
+    auto const root = hn::ConvertTo(d, hn::BitCast(di, hn::And(bits, hn::Set(du, 255))));
+    return hn::Mul(hn::Mul(root, root), hn::Set(d, 1.0F / (255.0F * 255.0F)));
+  };
+  auto const alpha = hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(color))), hn::Set(d, 1.0F / 255));
+  auto const weight = hn::Mul(alpha, share);
+  // Gradient on the screen of the key, whose change with x is −zx / z² (perspective) or −zx.
+  auto const per_z2 = hn::Mul(per_z, per_z);
+  auto const per_area = hn::Div(one, hn::IfThenElse(hn::Gt(stamp, hn::Set(d, 1e-6F)), area_signed, one));
+  auto const kx = hn::Neg(hn::Mul(zx, per_z2)), ky = hn::Neg(hn::Mul(zy, per_z2));
+  auto key_u = hn::Mul(hn::Sub(hn::Mul(kx, vy), hn::Mul(ky, vx)), per_area);
+  auto key_v = hn::Mul(hn::Sub(hn::Mul(ky, ux), hn::Mul(kx, uy)), per_area);
+  auto const key = t.perspective ? per_z : hn::Neg(depth);
+  // A surface that is seen from a grazing angle has many depths in a pixel; never more than a fifth of its own.
+  auto tolerance = hn::Mul(hn::Set(d, t.tolerance), per_z2);
+  auto const slant = hn::Mul(half, hn::Add(hn::Abs(key_u), hn::Abs(key_v)));
+  auto const most = hn::Max(tolerance, hn::Mul(hn::Set(d, 0.2F), hn::Abs(key)));
+  auto const limit = hn::Div(most, hn::Max(slant, most));
+  key_u = hn::Mul(key_u, limit);
+  key_v = hn::Mul(key_v, limit);
+  tolerance = hn::Add(tolerance, hn::Mul(slant, limit));
+  hn::Store(u, d, s.u + lane);
+  hn::Store(v, d, s.v + lane);
+  hn::Store(key, d, s.key + lane);
+  hn::Store(key_u, d, s.key_u + lane);
+  hn::Store(key_v, d, s.key_v + lane);
+  hn::Store(channel(color), d, s.red + lane);
+  hn::Store(channel(hn::ShiftRight<8>(color)), d, s.green + lane);
+  hn::Store(channel(hn::ShiftRight<16>(color)), d, s.blue + lane);
+  hn::Store(tolerance, d, s.tolerance + lane);
+  // A padded buffer takes what is beside a row; what is above or below is another's.
+  auto const floor_u = hn::Floor(u), floor_v = hn::Floor(v);
+  auto small = hn::And(hn::Lt(reach_u, one), hn::Lt(reach_v, one));
+  small = hn::And(small, hn::And(hn::Ge(floor_v, hn::Set(d, float(area.top))),
+                                 hn::Lt(floor_v, hn::Set(d, float(area.bottom - 1)))));
+  std::uint32_t small_bits = area.stencil == nullptr ? MaskBits(d, hn::And(small, valid)) : 0;
+  std::uint32_t wide_bits = MaskBits(d, valid) & ~small_bits;
+  if (small_bits != 0) {
+    auto const per_u = hn::Div(one, reach_u), per_v = hn::Div(one, reach_v);
+    auto const right = hn::Sub(u, floor_u), lower = hn::Sub(v, floor_v);
+    auto const tent = [&](auto away, auto per) HWY_ATTR { return hn::Max(zero, hn::Sub(one, hn::Mul(away, per))); };
+    hn::Store(tent(right, per_u), d, s.left_weight + lane);
+    hn::Store(tent(hn::Sub(one, right), per_u), d, s.right_weight + lane);
+    hn::Store(hn::Mul(weight, tent(lower, per_v)), d, s.top_weight + lane);
+    hn::Store(hn::Mul(weight, tent(hn::Sub(one, lower), per_v)), d, s.bottom_weight + lane);
+    hn::Store(hn::ConvertTo(di, floor_u), di, s.x + lane);
+    hn::Store(hn::ConvertTo(di, floor_v), di, s.y + lane);
+  }
+  if (wide_bits != 0) {
+    hn::Store(reach_u, d, s.reach_u + lane);
+    hn::Store(reach_v, d, s.reach_v + lane);
+    hn::Store(weight, d, s.weight + lane);
+  }
+  return {small_bits << lane, wide_bits << lane};
+}
+
+std::size_t DrawSplats(LdiPixels const& pixels, std::size_t first, std::size_t count, SplatTransform const& t,
+                       OutputArea const& area) {
+  std::size_t const lanes = hn::Lanes(Floats());
   std::size_t drawn = 0;
   Splats s;
-  for (std::size_t k = 0; k < count; k += lanes) {
-    std::size_t const i = first + k;
-    auto const x = hn::Add(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du8, pixels.x + i))), half);
-    auto const y = hn::Add(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du8, pixels.y + i))), half);
-    auto const z =
-        hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du16, pixels.depth + i))), hn::Set(d, t.depth_scale));
-    auto const scale = hn::Set(d, 1.0F / float(kLdiSlope));
-    auto const slope_x = hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(di8, pixels.slope_x + i))), scale);
-    auto const slope_y = hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(di8, pixels.slope_y + i))), scale);
-    auto const place = [&](int row) HWY_ATTR {
-      return hn::Add(hn::Add(hn::Mul(m(row, 0), x), hn::Mul(m(row, 1), y)), hn::Add(hn::Mul(m(row, 2), z), m(row, 3)));
-    };
-    auto const pu = place(0), pv = place(1), depth = place(2);
-    auto valid = hn::FirstN(d, count - k);
-    auto per_z = one;
-    if (t.perspective) {
-      valid = hn::And(valid, hn::Gt(depth, hn::Set(d, t.near)));
-      per_z = hn::Div(one, hn::Max(depth, hn::Set(d, t.near)));
+  // The order of splats counts, in which small ones come first: groups are as large whatever a vector holds.
+  for (std::size_t k = 0; k < count; k += kGroup) {
+    Drawn group;
+    for (std::size_t lane = 0; lane < kGroup && k + lane < count; lane += lanes) {
+      Drawn const some = PlaceSplats(pixels, first + k + lane, count - k - lane, t, area, lane, s);
+      group.small |= some.small;
+      group.wide |= some.wide;
     }
-    auto const u = hn::Mul(pu, per_z), v = hn::Mul(pv, per_z);
-    // How the screen moves with a grid step along x and along y on the tangent plane.
-    auto const step = [&](int row, int column, decltype(x) slope)
-                          HWY_ATTR { return hn::Add(m(row, column), hn::Mul(slope, m(row, 2))); };
-    auto zx = step(2, 0, slope_x), zy = step(2, 1, slope_y);
-    auto ux = step(0, 0, slope_x), uy = step(0, 1, slope_y), vx = step(1, 0, slope_x), vy = step(1, 1, slope_y);
-    if (t.perspective) {
-      ux = hn::Mul(hn::Sub(ux, hn::Mul(u, zx)), per_z);
-      uy = hn::Mul(hn::Sub(uy, hn::Mul(u, zy)), per_z);
-      vx = hn::Mul(hn::Sub(vx, hn::Mul(v, zx)), per_z);
-      vy = hn::Mul(hn::Sub(vy, hn::Mul(v, zy)), per_z);
-    }
-    auto const square = hn::Mul(hn::Set(d, t.step), per_z);
-    if (t.facing == 0) {
-      ux = vy = square;
-      uy = vx = zx = zy = zero;
-    }
-    auto const area_signed = hn::Sub(hn::Mul(ux, vy), hn::Mul(uy, vx));
-    // Where in doubt, a surface is seen though it is turned away a little, and covers as much as one that is not.
-    auto const facing_area = hn::Mul(hn::Mul(square, square), hn::Set(d, t.doubt));
-    auto const stamp = hn::Max(hn::Abs(area_signed), hn::Mul(facing_area, hn::Set(d, kDoubtedCover)));
-    if (t.facing != 0)
-      valid = hn::And(valid, hn::Gt(hn::Add(hn::Mul(area_signed, hn::Set(d, t.facing)),
-                                            hn::Mul(facing_area, hn::Set(d, kDoubtedTurn))),
-                                    zero));
-    auto const widest = hn::Set(d, t.widest);
-    auto const least = hn::Set(d, t.least);
-    auto reach_u = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(ux, ux), hn::Mul(uy, uy)))));
-    auto reach_v = hn::Min(widest, hn::Max(least, hn::Sqrt(hn::Add(hn::Mul(vx, vx), hn::Mul(vy, vy)))));
-    auto const share = hn::Min(one, hn::Div(stamp, hn::Mul(reach_u, reach_v)));
-    if (t.doubt != 0) {
-      // Noise has moved what lies around, too: whole surfaces must not have holes.
-      reach_u = hn::Mul(reach_u, hn::Set(d, kDoubtedReach));
-      reach_v = hn::Mul(reach_v, hn::Set(d, kDoubtedReach));
-    }
-    valid = hn::And(valid, hn::Gt(hn::Add(u, reach_u), hn::Set(d, float(area.first_x))));
-    valid = hn::And(valid, hn::Lt(hn::Sub(u, reach_u), hn::Set(d, float(area.end_x - 1))));
-    valid = hn::And(valid, hn::Gt(hn::Add(v, reach_v), hn::Set(d, float(area.first_y))));
-    valid = hn::And(valid, hn::Lt(hn::Sub(v, reach_v), hn::Set(d, float(area.end_y - 1))));
-    if (hn::AllFalse(d, valid)) continue;
-    auto const color = hn::LoadU(du, pixels.color + i);
-    auto const channel = [&](auto bits) HWY_ATTR {
-      auto const root = hn::ConvertTo(d, hn::BitCast(di, hn::And(bits, hn::Set(du, 255))));
-      return hn::Mul(hn::Mul(root, root), hn::Set(d, 1.0F / (255.0F * 255.0F)));
-    };
-    auto const alpha = hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<24>(color))), hn::Set(d, 1.0F / 255));
-    auto const weight = hn::Mul(alpha, share);
-    // Gradient on the screen of the key, whose change with x is −zx / z² (perspective) or −zx.
-    auto const per_z2 = hn::Mul(per_z, per_z);
-    auto const per_area = hn::Div(one, hn::IfThenElse(hn::Gt(stamp, hn::Set(d, 1e-6F)), area_signed, one));
-    auto const kx = hn::Neg(hn::Mul(zx, per_z2)), ky = hn::Neg(hn::Mul(zy, per_z2));
-    auto key_u = hn::Mul(hn::Sub(hn::Mul(kx, vy), hn::Mul(ky, vx)), per_area);
-    auto key_v = hn::Mul(hn::Sub(hn::Mul(ky, ux), hn::Mul(kx, uy)), per_area);
-    auto const key = t.perspective ? per_z : hn::Neg(depth);
-    // A surface that is seen from a grazing angle has many depths in a pixel; never more than a fifth of its own.
-    auto tolerance = hn::Mul(hn::Set(d, t.tolerance), per_z2);
-    auto const slant = hn::Mul(half, hn::Add(hn::Abs(key_u), hn::Abs(key_v)));
-    auto const most = hn::Max(tolerance, hn::Mul(hn::Set(d, 0.2F), hn::Abs(key)));
-    auto const limit = hn::Div(most, hn::Max(slant, most));
-    key_u = hn::Mul(key_u, limit);
-    key_v = hn::Mul(key_v, limit);
-    tolerance = hn::Add(tolerance, hn::Mul(slant, limit));
-    hn::Store(u, d, s.u);
-    hn::Store(v, d, s.v);
-    hn::Store(key, d, s.key);
-    hn::Store(key_u, d, s.key_u);
-    hn::Store(key_v, d, s.key_v);
-    hn::Store(channel(color), d, s.red);
-    hn::Store(channel(hn::ShiftRight<8>(color)), d, s.green);
-    hn::Store(channel(hn::ShiftRight<16>(color)), d, s.blue);
-    hn::Store(tolerance, d, s.tolerance);
-    // A padded buffer takes what is beside a row; what is above or below is another's.
-    auto const floor_u = hn::Floor(u), floor_v = hn::Floor(v);
-    auto small = hn::And(hn::Lt(reach_u, one), hn::Lt(reach_v, one));
-    small = hn::And(small, hn::And(hn::Ge(floor_v, hn::Set(d, float(area.top))),
-                                   hn::Lt(floor_v, hn::Set(d, float(area.bottom - 1)))));
-    std::uint32_t small_bits = area.stencil == nullptr ? MaskBits(d, hn::And(small, valid)) : 0;
-    std::uint32_t wide_bits = MaskBits(d, valid) & ~small_bits;
-    if (small_bits != 0) {
-      auto const per_u = hn::Div(one, reach_u), per_v = hn::Div(one, reach_v);
-      auto const right = hn::Sub(u, floor_u), lower = hn::Sub(v, floor_v);
-      auto const tent = [&](auto away, auto per) HWY_ATTR { return hn::Max(zero, hn::Sub(one, hn::Mul(away, per))); };
-      hn::Store(tent(right, per_u), d, s.left_weight);
-      hn::Store(tent(hn::Sub(one, right), per_u), d, s.right_weight);
-      hn::Store(hn::Mul(weight, tent(lower, per_v)), d, s.top_weight);
-      hn::Store(hn::Mul(weight, tent(hn::Sub(one, lower), per_v)), d, s.bottom_weight);
-      hn::Store(hn::ConvertTo(di, floor_u), di, s.x);
-      hn::Store(hn::ConvertTo(di, floor_v), di, s.y);
-    }
-    drawn += static_cast<std::size_t>(__builtin_popcount(small_bits | wide_bits));
-    if (wide_bits != 0) {
-      hn::Store(reach_u, d, s.reach_u);
-      hn::Store(reach_v, d, s.reach_v);
-      hn::Store(weight, d, s.weight);
-    }
+    drawn += static_cast<std::size_t>(__builtin_popcount(group.small | group.wide));
     if (area.stencil != nullptr) {
-      DrawAll<false, true>(s, small_bits, wide_bits, area);
+      DrawAll<false, true>(s, group.small, group.wide, area);
     } else if (t.fills) {
-      DrawAll<true, false>(s, small_bits, wide_bits, area);
+      DrawAll<true, false>(s, group.small, group.wide, area);
     } else {
-      DrawAll<false, false>(s, small_bits, wide_bits, area);
+      DrawAll<false, false>(s, group.small, group.wide, area);
     }
   }
   return drawn;

@@ -9,7 +9,6 @@
 #include "base/parallel.h"
 #include "base/srgb.h"
 #include "viewer/layered/ldi_traversal.h"
-#include "viewer/layered/square_kernels.h"
 
 namespace scanview {
 namespace {
@@ -89,8 +88,8 @@ std::size_t SquareCanvas::draw(LdiTree const& tree, std::vector<CellPart> const&
   for_each_index(context, layers_.size(), [&](std::size_t k) {
     Layer& layer = layers_[k];
     layer.depth.assign(size, std::numeric_limits<float>::infinity());
-    layer.color.resize(size);
-    SquareTarget const target{layer.depth.data(), layer.color.data(), camera.width(), camera.height()};
+    layer.samples.resize(size);
+    SquareTarget const target{layer.depth.data(), layer.samples.data(), camera.width(), camera.height()};
     // Every layer takes near and far cells, as many pixels as the others.
     std::size_t const grain = 1 << 14;
     for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -117,19 +116,20 @@ std::size_t SquareCanvas::draw(LdiTree const& tree, std::vector<CellPart> const&
                       end = std::min(size, begin + kBand * static_cast<std::size_t>(camera.width()));
     for (std::size_t i = begin; i < end; ++i) {
       float depth = layers_[0].depth[i];
-      std::uint32_t color = layers_[0].color[i];
+      SquareSample sample = layers_[0].samples[i];
       for (std::size_t k = 1; k < layers_.size(); ++k) {
         Layer const& other = layers_[k];
-        if (other.depth[i] < depth || (other.depth[i] == depth && other.color[i] < color))
-          depth = other.depth[i], color = other.color[i];
+        if (other.depth[i] < depth || (other.depth[i] == depth && other.samples[i] < sample))
+          depth = other.depth[i], sample = other.samples[i];
       }
       std::size_t const x = i % static_cast<std::size_t>(camera.width()),
                         y = i / static_cast<std::size_t>(camera.width());
       bool const is_there = depth < std::numeric_limits<float>::infinity();
+      std::uint32_t const color = sample.color;
       std::uint32_t* const out = static_cast<std::uint32_t*>(static_cast<void*>(frame.color.ptr(static_cast<int>(y))));
       out[x] =
           is_there ? srgb[color >> 16 & 255] | srgb[color >> 8 & 255] << 8 | srgb[color & 255] << 16 | 0xff000000U : 0;
-      frame.depth[static_cast<int>(y)][x] = is_there ? depth : kMissing;
+      frame.depth[static_cast<int>(y)][x] = is_there ? sample.depth : kMissing;
     }
   });
   return pixels.back();

@@ -7,6 +7,7 @@
 #include "base/context.h"
 #include "viewer/layered/ldi_tree.h"
 #include "viewer/layered/splat_canvas.h"
+#include "viewer/layered/square_kernels.h"
 #include "viewer/renderer.h"
 
 namespace scanview {
@@ -27,7 +28,7 @@ class SquareCanvas {
   /// A thread's own picture.
   struct Layer {
     std::vector<float> depth;
-    std::vector<std::uint32_t> color;
+    std::vector<SquareSample> samples;
   };
   std::vector<Layer> layers_;
   std::map<std::int32_t, std::string> damaged_;

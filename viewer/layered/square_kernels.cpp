@@ -34,7 +34,7 @@ HWY_INLINE void DrawThem(Squares const& squares, std::uint32_t bits, std::uint32
     // Of squares of one surface that which is best in the pixel's middle wins.
     float const nearest = squares.depth[k], u = squares.u[k], v = squares.v[k], per_reach = squares.per_reach[k];
     int left = squares.left[k], y = squares.top[k];
-    std::uint32_t const color = colors[k];
+    SquareSample const sample{colors[k], nearest};
     std::size_t at = static_cast<std::size_t>(squares.at[k]);
     for (std::int32_t rows = squares.rows[k]; rows > 0; --rows, ++y, at += static_cast<std::size_t>(target.width)) {
       float const dy = (float(y) - v) * per_reach;
@@ -43,9 +43,9 @@ HWY_INLINE void DrawThem(Squares const& squares, std::uint32_t bits, std::uint32
         std::size_t const i = at + static_cast<std::size_t>(c);
         float const dx = (float(left + c) - u) * per_reach;
         float const depth = of_row + bias * dx * dx;
-        if (depth > target.depth[i] || (depth == target.depth[i] && color >= target.color[i])) continue;
+        if (depth > target.depth[i] || (depth == target.depth[i] && !(sample < target.samples[i]))) continue;
         target.depth[i] = depth;
-        target.color[i] = color;
+        target.samples[i] = sample;
       }
     }
   }

@@ -21,15 +21,27 @@ struct SquareTransform {
   bool perspective;
 };
 
-/// Depths of a picture (infinite where there is nothing) and which color is nearest; rows without gaps.
+/// What is seen of a square.
+struct SquareSample {
+  std::uint32_t color;  ///< of LdiPixels
+  float depth;          ///< of its middle
+
+  /// Which of two at one depth wins.
+  bool operator<(SquareSample const& other) const {
+    return color != other.color ? color < other.color : depth < other.depth;
+  }
+};
+
+/// How far squares count at each pixel of a picture (SquareTransform::bias; infinite where there is none), and the
+/// nearest; rows without gaps.
 struct SquareTarget {
   float* depth;
-  std::uint32_t* color;  ///< of LdiPixels
+  SquareSample* samples;
   std::int32_t width, height;
 };
 
 /// Draws pixels [first, first + count) of a cell, each the square of its grid step, a pixel at least; the nearest depth
-/// wins, of equal ones the smaller color, whatever the order. Pixels that cover less than a half are left out.
+/// wins, of equal ones the smaller sample, whatever the order. Pixels that cover less than a half are left out.
 void draw_squares(LdiPixels const& pixels, std::size_t first, std::size_t count, SquareTransform const& transform,
                   SquareTarget const& target);
 
