@@ -13,8 +13,8 @@
 namespace scanview {
 namespace {
 
-/// A square's side in grid steps: on a surface that is at 45 degrees to the face they lie farther apart.
-constexpr double kSide = 1.2;
+/// A square's side in grid steps, where it is not known how the surface lies.
+constexpr double kFacingSide = 1.5;
 /// So many grid steps farther a square counts at its edge: of squares of one surface that wins which is best in the
 /// middle of the pixel, and outlines are not fatter by half a square. 2 dB better than the nearest alone.
 constexpr double kBias = 4;
@@ -37,7 +37,7 @@ SquareTransform square_transform(LdiTree const& tree, LdiCell const& cell, int f
   transform.depth_scale = float(tree.options.resolution) / 65536;
   bool const oriented = tree.options.normals == LdiOptions::Normals::measured;
   transform.facing = !oriented ? 0 : face % 2 == 0 ? -1 : 1;
-  transform.half = static_cast<float>(kSide / 2 * step * std::sqrt(camera.fx() * camera.fy()));
+  transform.half = static_cast<float>(kFacingSide / 2 * step * std::sqrt(camera.fx() * camera.fy()));
   transform.bias = static_cast<float>(kBias * step);
   transform.near = static_cast<float>(near);
   transform.perspective = camera.is_perspective();

@@ -16,6 +16,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 
+/// A square's side in grid steps: a little more, since neighbours are not quite as far away.
+constexpr float kSide = 1.1F;
 constexpr float kMostHalf = 32;  // pixels: bounds what a square costs
 
 struct Squares {
@@ -76,7 +78,7 @@ void DrawSquares(LdiPixels const& pixels, std::size_t first, std::size_t count, 
       return hn::Add(hn::Add(hn::Mul(m(row, 0), x), hn::Mul(m(row, 1), y)), hn::Add(hn::Mul(m(row, 2), z), m(row, 3)));
     };
     auto const depth = place(2);
-    auto u = place(0), v = place(1), reach = hn::Set(d, t.half);
+    auto u = place(0), v = place(1), per_z = one;
     auto drawn = hn::Lt(depth, infinite);
     if (count - k < lanes) drawn = hn::And(drawn, hn::FirstN(d, count - k));
     // Of coverages from a half on the highest bit is set, which as a sign is negative.
@@ -84,27 +86,40 @@ void DrawSquares(LdiPixels const& pixels, std::size_t first, std::size_t count, 
     drawn = hn::And(drawn, hn::RebindMask(d, hn::Lt(color, hn::Zero(di))));
     if (t.perspective) {
       drawn = hn::And(drawn, hn::Gt(depth, hn::Set(d, t.near)));
-      auto const per_z = hn::Div(one, depth);
-      u = hn::Mul(u, per_z), v = hn::Mul(v, per_z), reach = hn::Mul(reach, per_z);
+      per_z = hn::Div(one, depth);
+      u = hn::Mul(u, per_z), v = hn::Mul(v, per_z);
     }
+    auto reach_u = hn::Mul(hn::Set(d, t.half), per_z), reach_v = reach_u;
     if (t.facing != 0) {
-      // The normal is (−slope_x, −slope_y, 1), and is to look back along the ray.
       auto const slope = [&](std::int8_t const* from) HWY_ATTR {
         return hn::Mul(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(di8, from + i))),
                        hn::Set(d, 1.0F / float(kLdiSlope)));
       };
+      auto const slope_x = slope(pixels.slope_x), slope_y = slope(pixels.slope_y);
+      // Half of the box around the grid's cell, as it lies on the tangent plane and on the screen.
+      auto const reach = [&](int row, decltype(x) at) HWY_ATTR {
+        auto const side = [&](int column, decltype(x) along) HWY_ATTR {
+          auto const moved = hn::Add(m(row, column), hn::Mul(along, m(row, 2)));
+          if (!t.perspective) return hn::Abs(moved);
+          auto const deeper = hn::Add(m(2, column), hn::Mul(along, m(2, 2)));
+          return hn::Abs(hn::Mul(hn::Sub(moved, hn::Mul(at, deeper)), per_z));
+        };
+        return hn::Mul(hn::Set(d, 0.5F * kSide), hn::Add(side(0, slope_x), side(1, slope_y)));
+      };
+      reach_u = reach(0, u), reach_v = reach(1, v);
+      // The normal is (−slope_x, −slope_y, 1), and is to look back along the ray.
       auto const away = [&](decltype(x) at, int axis) HWY_ATTR {
         return t.eye[3] != 0 ? hn::Sub(at, hn::Set(d, t.eye[axis])) : hn::Set(d, t.eye[axis]);
       };
-      auto const along = hn::Sub(
-          away(z, 2), hn::Add(hn::Mul(slope(pixels.slope_x), away(x, 0)), hn::Mul(slope(pixels.slope_y), away(y, 1))));
+      auto const along = hn::Sub(away(z, 2), hn::Add(hn::Mul(slope_x, away(x, 0)), hn::Mul(slope_y, away(y, 1))));
       drawn = hn::And(drawn, hn::Lt(hn::Mul(along, hn::Set(d, t.facing)), zero));
     }
-    reach = hn::Min(hn::Max(reach, half), hn::Set(d, kMostHalf));
-    auto const first_u = hn::Ceil(hn::Sub(u, reach)), first_v = hn::Ceil(hn::Sub(v, reach));
+    reach_u = hn::Min(hn::Max(reach_u, half), hn::Set(d, kMostHalf));
+    reach_v = hn::Min(hn::Max(reach_v, half), hn::Set(d, kMostHalf));
+    auto const first_u = hn::Ceil(hn::Sub(u, reach_u)), first_v = hn::Ceil(hn::Sub(v, reach_v));
     // Rounding may lose the only pixel of the smallest square.
-    auto const end_u = hn::Max(hn::Ceil(hn::Add(u, reach)), hn::Add(first_u, one));
-    auto const end_v = hn::Max(hn::Ceil(hn::Add(v, reach)), hn::Add(first_v, one));
+    auto const end_u = hn::Max(hn::Ceil(hn::Add(u, reach_u)), hn::Add(first_u, one));
+    auto const end_v = hn::Max(hn::Ceil(hn::Add(v, reach_v)), hn::Add(first_v, one));
     drawn = hn::And(drawn, hn::And(hn::Lt(first_u, columns_of_all), hn::Gt(end_u, zero)));
     drawn = hn::And(drawn, hn::And(hn::Lt(first_v, rows_of_all), hn::Gt(end_v, zero)));
     if (hn::AllFalse(d, drawn)) continue;
@@ -130,7 +145,7 @@ void DrawSquares(LdiPixels const& pixels, std::size_t first, std::size_t count, 
     hn::Store(columns, di, squares.columns);
     hn::Store(u, d, squares.u);
     hn::Store(v, d, squares.v);
-    hn::Store(hn::Div(one, reach), d, squares.per_reach);
+    hn::Store(hn::Div(one, hn::Max(reach_u, reach_v)), d, squares.per_reach);
     hn::Store(left, di, squares.left);
     hn::Store(top, di, squares.top);
     hn::Store(rows, di, squares.rows);

@@ -15,7 +15,7 @@ struct SquareTransform {
   float depth_scale;  ///< steps in 1/65536 of the cell
   float eye[4];       ///< in grid steps and 1, or the direction of sight and 0
   float facing;       ///< ±1: the side along the depth axis that is to be seen; 0: both
-  float half;         ///< half the side of a square, in pixels (times z: perspective); at least half a pixel is drawn
+  float half;         ///< where facing is 0: half the side of a square, in pixels (times z: perspective)
   float bias;         ///< how much farther a square counts at its edge, in units of depth
   float near;         ///< nothing nearer is drawn
   bool perspective;
@@ -40,8 +40,8 @@ struct SquareTarget {
   std::int32_t width, height;
 };
 
-/// Draws pixels [first, first + count) of a cell, each the square of its grid step, a pixel at least; the nearest depth
-/// wins, of equal ones the smaller sample, whatever the order. Pixels that cover less than a half are left out.
+/// Draws pixels [first, first + count) of a cell, each the box around its grid step, a pixel at least; the nearest
+/// depth wins, of equal ones the smaller sample, whatever the order. Pixels that cover less than a half are left out.
 void draw_squares(LdiPixels const& pixels, std::size_t first, std::size_t count, SquareTransform const& transform,
                   SquareTarget const& target);
 
