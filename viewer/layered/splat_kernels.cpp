@@ -261,6 +261,14 @@ HWY_INLINE Drawn PlaceSplats(LdiPixels const& pixels, std::size_t i, std::size_t
   key_u = hn::Mul(key_u, limit);
   key_v = hn::Mul(key_v, limit);
   tolerance = hn::Add(tolerance, hn::Mul(slant, limit));
+  if (t.perspective) {
+    // Beyond a tangent plane's horizon there is no depth: over all of a splat it is at most doubled.
+    auto const rise = hn::Add(hn::Mul(hn::Abs(key_u), reach_u), hn::Mul(hn::Abs(key_v), reach_v));
+    auto const half_key = hn::Mul(half, key);
+    auto const share = hn::Div(half_key, hn::Max(rise, half_key));
+    key_u = hn::Mul(key_u, share);
+    key_v = hn::Mul(key_v, share);
+  }
   hn::Store(u, d, s.u + lane);
   hn::Store(v, d, s.v + lane);
   hn::Store(key, d, s.key + lane);
