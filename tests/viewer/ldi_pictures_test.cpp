@@ -468,5 +468,26 @@ TEST(LdiPictures, FromWithinSurfacesHaveDepthsThatCanBe) {
   }
 }
 
+TEST(LdiPictures, OfOrthographicCamerasDoNotDependOnHowFarAwayTheyAre) {
+  // A wall that is seen from a grazing angle, before a plane.
+  View const wall = plane_view("wall", square_view(96), toward({1.3, 0, 0}, {0, 0, -1}),
+                               Vector3d(1, 0, 0.1).normalized(), 0, wavy_paint(0.3));
+  LdiRenderer renderer(
+      std::make_shared<LdiTree>(tree_of({slanted(square_view(96), toward({0.3, 0.2, 1}, {0, 0, -2})), wall})), {});
+  Camera const camera = Camera::orthographic(200, 200, 0.015, 0.015, 100, 100);
+  Eigen::Isometry3d const pose = toward({0.5, 0.1, 4}, {0.1, 0, -1});
+  Frame const expected = renderer.render(camera, pose);
+  EXPECT_GT(cv::countNonZero(expected.depth > 0), 20000);
+  for (double const move : {-2.0, 3.0, 4.0, 4.5, 5.0, 8.0}) {
+    Eigen::Isometry3d moved = pose;
+    moved.translation() += move * pose.linear().col(2);
+    Frame const frame = renderer.render(camera, moved);
+    std::size_t other = 0;
+    for (int y = 0; y < 200; ++y)
+      for (int x = 0; x < 200; ++x) other += cv::norm(frame.color(y, x), expected.color(y, x), cv::NORM_INF) > 4;
+    EXPECT_LE(other, 2U) << move;  // where rounding decides what is one surface
+  }
+}
+
 }  // namespace
 }  // namespace scanview::test

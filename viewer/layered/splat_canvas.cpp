@@ -106,6 +106,8 @@ SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, 
   transform.facing = !oriented ? 0 : face % 2 == 0 ? 1 : -1;
   transform.tolerance = static_cast<float>(tree.merge_distance(cell.key.level));
   transform.near = static_cast<float>(near);
+  // A fifth of the picture's size, as what is about as far away has where perspective is.
+  transform.deepest = static_cast<float>(0.2 * std::max(camera.width() / camera.fx(), camera.height() / camera.fy()));
   transform.least = kLeast;
   transform.widest = kWidest;
   transform.perspective = perspective;

@@ -38,6 +38,7 @@ struct SplatTransform {
   float facing;         ///< ±1: only surfaces whose grid turns that way on the screen; 0: all
   float tolerance;      ///< in units of depth
   float near;           ///< perspective: nothing nearer is drawn
+  float deepest;        ///< orthographic: what the depths of a surface in a pixel may differ by
   float least, widest;  ///< reach of a splat, in pixels
   bool perspective;
   bool fills;  ///< a layer takes no more than what it lacks to be covered once
