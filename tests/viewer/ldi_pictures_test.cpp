@@ -424,5 +424,70 @@ TEST(LdiPictures, AreEqualOnAnyThreadsAndInstructions) {
     }
 }
 
+TEST(LdiPictures, FromWithinSurfacesHaveDepthsThatCanBe) {
+  // Splats of steep surfaces beside the eye reach beyond their tangent planes' horizons.
+  std::vector<View> const views = {slanted(square_view(64), toward({0.3, 0.2, 1}, {0, 0, -2})),
+                                   plane_view("wall", square_view(64), toward({2, 0.5, 1}, {-1, 0, -1.5}),
+                                              Vector3d(1, 0.2, 0.3).normalized(), -1.2, wavy_paint(1))};
+  constexpr std::uint64_t kSeed = 7;
+  for (int const resolution : {1, 5, 64}) {
+    LdiOptions options;
+    options.resolution = resolution;
+    auto const tree = std::make_shared<LdiTree>(tree_of(views, options));
+    double const near = nearest_drawn(*tree);
+    auto const places = pixels_of(*tree);
+    for (std::uint64_t i = 0; i < 30; ++i) {
+      CounterRandom random(kSeed, i);
+      auto const any = [&] { return 2 * random.uniform() - 1; };
+      // In a pixel's middle, on a cell's corner or face, or beside.
+      Vector3d eye = places[random.below(static_cast<std::uint32_t>(places.size()))].at;
+      LdiCell const& cell = tree->cells[random.below(static_cast<std::uint32_t>(tree->cells.size()))];
+      if (i % 5 == 0) eye = tree->box(cell).min();
+      if (i % 5 == 1) eye = {eye.x(), eye.y(), tree->box(cell).min().z()};
+      if (i % 5 == 2) eye += 0.05 * Vector3d(any(), any(), any());
+      Eigen::Isometry3d const pose = toward(eye, Vector3d(any(), any(), any() - 1));
+      Camera const camera = Camera::perspective(111, 65, 50, 60, 55, 32);
+      for (auto const splats : {LdiRenderOptions::Splats::blended, LdiRenderOptions::Splats::squares}) {
+        LdiRenderOptions how;
+        how.splats = splats;
+        how.stamp_px = i % 2 == 0 ? 1 : 16;
+        Frame const frame = LdiRenderer(tree, how).render(camera, pose);
+        for (int y = 0; y < frame.color.rows; ++y)
+          for (int x = 0; x < frame.color.cols; ++x) {
+            double const z = double(frame.depth(y, x));
+            if (frame.color(y, x)[3] == 0) {
+              EXPECT_TRUE(std::isnan(z));
+            } else {
+              // Of the scene, which is smaller than 20; over a splat depths are two thirds to twice its middle's.
+              EXPECT_GE(z, 0.66 * near) << resolution << " seed " << i << ' ' << x << ' ' << y;
+              EXPECT_LE(z, 40) << resolution << " seed " << i << ' ' << x << ' ' << y;
+            }
+          }
+      }
+    }
+  }
+}
+
+TEST(LdiPictures, OfOrthographicCamerasDoNotDependOnHowFarAwayTheyAre) {
+  // A wall that is seen from a grazing angle, before a plane.
+  View const wall = plane_view("wall", square_view(96), toward({1.3, 0, 0}, {0, 0, -1}),
+                               Vector3d(1, 0, 0.1).normalized(), 0, wavy_paint(0.3));
+  LdiRenderer renderer(
+      std::make_shared<LdiTree>(tree_of({slanted(square_view(96), toward({0.3, 0.2, 1}, {0, 0, -2})), wall})), {});
+  Camera const camera = Camera::orthographic(200, 200, 0.015, 0.015, 100, 100);
+  Eigen::Isometry3d const pose = toward({0.5, 0.1, 4}, {0.1, 0, -1});
+  Frame const expected = renderer.render(camera, pose);
+  EXPECT_GT(cv::countNonZero(expected.depth > 0), 20000);
+  for (double const move : {-2.0, 3.0, 4.0, 4.5, 5.0, 8.0}) {
+    Eigen::Isometry3d moved = pose;
+    moved.translation() += move * pose.linear().col(2);
+    Frame const frame = renderer.render(camera, moved);
+    std::size_t other = 0;
+    for (int y = 0; y < 200; ++y)
+      for (int x = 0; x < 200; ++x) other += cv::norm(frame.color(y, x), expected.color(y, x), cv::NORM_INF) > 4;
+    EXPECT_LE(other, 2U) << move;  // where rounding decides what is one surface
+  }
+}
+
 }  // namespace
 }  // namespace scanview::test

@@ -278,13 +278,22 @@ HWY_INLINE Drawn PlaceSplats(LdiPixels const& pixels, std::size_t i, std::size_t
   auto key_v = hn::Mul(hn::Sub(hn::Mul(ky, ux), hn::Mul(kx, uy)), per_area);
   auto const key = t.perspective ? per_z : hn::Neg(depth);
   // A surface that is seen from a grazing angle has many depths in a pixel; never more than a fifth of its own.
+  auto const fifth = t.perspective ? hn::Mul(hn::Set(d, 0.2F), hn::Abs(key)) : hn::Set(d, t.deepest);
   auto tolerance = hn::Mul(hn::Set(d, t.tolerance), per_z2);
   auto const slant = hn::Mul(half, hn::Add(hn::Abs(key_u), hn::Abs(key_v)));
-  auto const most = hn::Max(tolerance, hn::Mul(hn::Set(d, 0.2F), hn::Abs(key)));
+  auto const most = hn::Max(tolerance, fifth);
   auto const limit = hn::Div(most, hn::Max(slant, most));
   key_u = hn::Mul(key_u, limit);
   key_v = hn::Mul(key_v, limit);
   tolerance = hn::Add(tolerance, hn::Mul(slant, limit));
+  if (t.perspective) {
+    // Beyond a tangent plane's horizon there is no depth: over all of a splat it is at most doubled.
+    auto const rise = hn::Add(hn::Mul(hn::Abs(key_u), reach_u), hn::Mul(hn::Abs(key_v), reach_v));
+    auto const half_key = hn::Mul(half, key);
+    auto const share = hn::Div(half_key, hn::Max(rise, half_key));
+    key_u = hn::Mul(key_u, share);
+    key_v = hn::Mul(key_v, share);
+  }
   hn::Store(u, d, s.u + lane);
   hn::Store(v, d, s.v + lane);
   hn::Store(key, d, s.key + lane);

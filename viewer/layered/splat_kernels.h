@@ -40,6 +40,7 @@ struct SplatTransform {
   float doubt;      ///< 0: normals are exact; 1: surfaces may be turned more to the camera than they say
   float tolerance;  ///< in units of depth
   float near;       ///< perspective: nothing nearer is drawn
+  float deepest;    ///< orthographic: what the depths of a surface in a pixel may differ by
   float least, widest;  ///< reach of a splat, in pixels
   bool perspective;
   bool fills;  ///< a layer takes no more than what it lacks to be covered once
