@@ -12,7 +12,7 @@
 namespace scanview {
 namespace {
 
-constexpr double kFull = 256;  // weight of a grid point that is covered once (kLdiFullWeight)
+constexpr double kFull = kLdiFullWeight;
 /// A stamp of a surface that is seen from a grazing angle reaches no further than so many grid points.
 constexpr float kFarthest = 48;
 /// More than a tangent plane, of slopes up to 1, rises over that reach.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <map>
 
 #include "base/parallel.h"
@@ -13,7 +13,7 @@ namespace {
 
 using Contents = std::unordered_map<LdiCellKey, LdiContent, LdiCellKeyHash>;
 
-constexpr double kOwnFull = 256, kFilteredFull = 255 * 64;
+constexpr double kOwnFull = kLdiFullWeight, kFilteredFull = 255 * 64;
 /// Pixels that cover less are left out, but for those that stand alone: a stamp's rim.
 constexpr int kLeastCover = 3;
 

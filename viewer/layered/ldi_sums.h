@@ -7,11 +7,13 @@
 
 namespace scanview {
 
+inline constexpr int kLdiFullWeight = 256;  ///< of a grid point that is covered once
+
 /// What has been splatted to one place of a cell: sums of integers, which do not depend on the order of what is summed.
 struct LdiSum {
   std::uint32_t next = 0;                      ///< the next farther one in its column; 0: none
   std::uint32_t bin = 0;                       ///< depth in bins, rounded down
-  std::uint32_t weight = 0;                    ///< kLdiFullWeight: covered once
+  std::uint32_t weight = 0;                    ///< kLdiFullWeight where covered once
   std::uint32_t depth = 0;                     ///< Σ weight · (beyond the bin's start, 1/256 bin)
   std::uint64_t red = 0, green = 0, blue = 0;  ///< Σ weight · (linear light, stamp.h)
   std::uint32_t slope_x = 0, slope_y = 0;      ///< Σ weight · (slope · 127 + 128)

@@ -3,6 +3,9 @@
 #include <oneapi/tbb/info.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "base/error.h"
