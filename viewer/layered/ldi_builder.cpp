@@ -91,7 +91,8 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
                 "feature");
   double const x = at[b] - 0.5, y = at[c] - 0.5, depth = at[axis];
   float rise = std::abs(landing.slope_x) * landing.reach_x + std::abs(landing.slope_y) * landing.reach_y;
-  if (rise > 0) rise += 1e-3F;  // for what is rounded
+  constexpr double kRounding = 1e-3;
+  if (rise > 0) rise += float(kRounding);
   std::int64_t const bin = floor_to_int(depth);
   landing.depth = std::min(static_cast<float>(depth - double(bin)), 1 - 0x1p-16F) + float(kDeep);
   auto const low = [&](double value, float reach) {
@@ -105,9 +106,22 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
                                 cell_of(floor_to_int(y + double(landing.reach_y))),
                                 cell_of(floor_to_int(depth + double(rise)))};
   landing.cell.level = level;
-  for (std::int64_t z = first[2]; z <= last[2]; ++z)
-    for (std::int64_t j = first[1]; j <= last[1]; ++j)
-      for (std::int64_t i = first[0]; i <= last[0]; ++i) {
+  // How far the plane rises from the middle to the grid points of a row of cells, at least and at most.
+  auto const rises = [&](std::int64_t cell, double value, float reach, float slope) {
+    double const most = double(reach), at_low = std::clamp(double(cell * n) - value, -most, most),
+                 at_high = std::clamp(double(cell * n + n - 1) - value, -most, most);
+    return std::minmax({double(slope) * at_low, double(slope) * at_high});
+  };
+  for (std::int64_t j = first[1]; j <= last[1]; ++j)
+    for (std::int64_t i = first[0]; i <= last[0]; ++i) {
+      std::int64_t low_z = first[2], high_z = last[2];
+      if (low_z < high_z) {
+        auto const [low_x, high_x] = rises(i, x, landing.reach_x, landing.slope_x);
+        auto const [low_y, high_y] = rises(j, y, landing.reach_y, landing.slope_y);
+        low_z = cell_of(floor_to_int(depth + low_x + low_y - kRounding));
+        high_z = cell_of(floor_to_int(depth + high_x + high_y + kRounding));
+      }
+      for (std::int64_t z = low_z; z <= high_z; ++z) {
         landing.cell.index[static_cast<std::size_t>(axis)] = z;
         landing.cell.index[static_cast<std::size_t>(b)] = i;
         landing.cell.index[static_cast<std::size_t>(c)] = j;
@@ -116,6 +130,7 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
         landing.bin = static_cast<std::int32_t>(bin - z * n);
         landings.push_back(landing);
       }
+    }
 }
 
 namespace {
