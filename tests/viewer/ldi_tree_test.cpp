@@ -248,6 +248,15 @@ TEST(LdiBuilder, WhatIsTooFarToBePlacedIsRefused) {
   builder_of({pixel_at({1e12, -1e12, 0}, 1)});
 }
 
+TEST(LdiBuilder, StampsMayBeAsSmallOrLargeAsAFloatCanBe) {
+  for (double const size : {1e-44, 1e-39, 1e-30, 1e30, 3e38})
+    for (double const coarseness : {0.25, 1.0, 4.0}) {
+      LdiTree const tree = tree_of({pixel_at({0, 0, 0}, size)}, facing(64, coarseness));
+      EXPECT_GT(tree.pixel_count(), 0U) << size;
+      for (PlacedPixel const& pixel : pixels_of(tree)) EXPECT_TRUE(pixel.at.allFinite()) << size;
+    }
+}
+
 TEST(LdiBuilder, WhatIsTooSmallForTheGridIsRefused) {
   LdiOptions options = facing(64);
   options.smallest_feature = 64;

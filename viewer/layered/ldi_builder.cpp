@@ -60,10 +60,11 @@ void LdiBuilder::land(Stamp const& stamp, std::vector<Landing>& landings) const 
   landing.blue = stamp.blue;
   landing.slope_x = oriented ? -stamp.normal[b] / stamp.normal[axis] : 0;
   landing.slope_y = oriented ? -stamp.normal[c] / stamp.normal[axis] : 0;
-  float const per_step = static_cast<float>(1 / step);
-  float const size = stamp.size * per_step;
-  float u_x = stamp.along_u[b] * per_step, u_y = stamp.along_u[c] * per_step;
-  float v_x = stamp.along_v[b] * per_step, v_y = stamp.along_v[c] * per_step;
+  // As doubles: a float may have no room for the inverse of its own size.
+  auto const in_steps = [&](float length) { return static_cast<float>(double(length) / step); };
+  float const size = in_steps(stamp.size);
+  float u_x = in_steps(stamp.along_u[b]), u_y = in_steps(stamp.along_u[c]);
+  float v_x = in_steps(stamp.along_v[b]), v_y = in_steps(stamp.along_v[c]);
   if (!oriented) u_x = v_y = size, u_y = v_x = 0;
   float determinant = u_x * v_y - u_y * v_x;
   landing.share = 1;
