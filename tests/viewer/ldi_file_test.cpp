@@ -405,6 +405,26 @@ TEST(LdiFile, TextThatCannotBeIsRefusedThoughTheHashFits) {
   expect_refused(text.replace(text.find("\"radius\":") + 9, 1, "1e999"));
 }
 
+TEST(LdiFile, SumsLieInBinsThatTheCellHas) {
+  LdiOptions options;
+  options.resolution = 7;
+  options.depth_error = 2;
+  ASSERT_EQ(options.bin_shift(0), 1);
+  for (std::uint32_t const bin : {0U, 3U, 4U, 6U}) {
+    // Of bins of one step, as they would be without errors of depth.
+    auto sums = std::make_unique<LdiSums>(options.resolution);
+    sums->at(2, 1, 5, bin).weight = 9;
+    LdiSumCells cells;
+    cells.emplace(LdiCellKey{}, std::move(sums));
+    std::string const bytes = encode_sums(cells);
+    if (bin < 4) {
+      EXPECT_EQ(encode_sums(decode_sums(bytes, options, "a.ldi")), bytes);
+    } else {
+      EXPECT_SCANVIEW_ERROR(decode_sums(bytes, options, "a.ldi"), ErrorCode::bad_input, "sums");
+    }
+  }
+}
+
 TEST(LdiFile, SumsThatCannotBeAreRefusedThoughTheHashFits) {
   TemporaryFolder const folder;
   fs::path const path = folder.path() / "tree.ldi", bad = folder.path() / "bad.ldi";

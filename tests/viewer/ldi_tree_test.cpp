@@ -248,6 +248,23 @@ TEST(LdiBuilder, WhatIsTooFarToBePlacedIsRefused) {
   builder_of({pixel_at({1e12, -1e12, 0}, 1)});
 }
 
+TEST(LdiBuilder, BinsThatCellsEndWithinHaveTheirOwnDepths) {
+  // Cells of 5 or 7 steps end within bins of 2 and 4.
+  for (int const resolution : {5, 7, 64})
+    for (double const depth_error : {0.0, 2.0, 4.0, 100.0}) {
+      LdiOptions options = facing(resolution);
+      options.depth_error = depth_error;
+      double const steps = 1 << options.bin_shift(0);
+      EXPECT_LE(steps, std::max(1.0, depth_error));
+      EXPECT_LE(steps, resolution);
+      for (double depth = -8.7; depth < 8; ++depth)
+        for (PlacedPixel const& pixel : pixels_of(tree_of({pixel_at({depth, 0.2, 0.3}, 1)}, options)))
+          if (pixel.level == 0) {
+            EXPECT_NEAR(pixel.at.x() - ldi_origin().x(), depth, steps / 256 + resolution / 65536.0) << resolution;
+          }
+    }
+}
+
 TEST(LdiBuilder, StampsMayBeAsSmallOrLargeAsAFloatCanBe) {
   for (double const size : {1e-44, 1e-39, 1e-30, 1e30, 3e38})
     for (double const coarseness : {0.25, 1.0, 4.0}) {

@@ -105,7 +105,7 @@ void encode_face(LdiSums const& sums, int face, Writer& out) {
 
 void decode_face(Reader& in, int face, LdiSums& sums) {
   int const n = sums.resolution();
-  std::int64_t const columns = std::int64_t{n} * n;
+  std::int64_t const columns = std::int64_t{n} * n, bins = ((n - 1) >> sums.bin_shift()) + 1;
   std::uint64_t const count = in.get(in.left() / kLeastBytes);
   std::int64_t column = 0, bin = 0;
   std::int64_t last_place = -1;
@@ -113,7 +113,7 @@ void decode_face(Reader& in, int face, LdiSums& sums) {
   for (std::uint64_t i = 0; i < count; ++i) {
     column += static_cast<std::int64_t>(in.get(static_cast<std::uint64_t>(columns)));
     std::int64_t const change = in.get_signed();
-    if (column >= columns || change < -bin || change >= n - bin) in.refuse();
+    if (column >= columns || change < -bin || change >= bins - bin) in.refuse();
     bin += change;
     std::int64_t const place = column * n + bin;
     if (place <= last_place) in.refuse();
