@@ -14,7 +14,7 @@ namespace {
 using Contents = std::unordered_map<LdiCellKey, LdiContent, LdiCellKeyHash>;
 
 constexpr double kOwnFull = kLdiFullWeight, kFilteredFull = 255 * 64;
-/// Pixels that cover less are left out, but for those that stand alone: a stamp's rim.
+/// Pixels that cover less, of 255, are left out.
 constexpr int kLeastCover = 3;
 
 /// One layer of a grid point: neighbouring depth bins that are one surface.
