@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "viewer/window/keyframe_buttons.h"
+
 namespace scanview {
 namespace {
 
@@ -175,15 +177,7 @@ void draw_buttons(PanelContent& content, PanelAnswer& answer) {
   button(content.turning ? "stop (space)" : "turntable (space)", Command::turntable, false);
   button("picture (P)", Command::save_picture);
   button("help (H)", Command::help, false);
-  button("keyframe (K)", Command::add_keyframe);
-  ImGui::Text("%zu", content.keyframes);
-  if (content.keyframes == 0) return;
-  ImGui::SameLine();
-  button("remove", Command::remove_keyframe, false);
-  ImGui::PushItemWidth(0.35F * ImGui::GetContentRegionAvail().x);
-  ImGui::SliderInt("frames between", &content.frames_between, 1, 240, "%d", ImGuiSliderFlags_AlwaysClamp);
-  ImGui::PopItemWidth();
-  ImGui::TextWrapped("%s", content.keyframe_command.c_str());
+  draw_keyframe_buttons(content.keyframes, content.keyframe_command, content.frames_between, answer.commands);
 }
 
 void draw_strip(PanelContent const& content, float scale) {

@@ -8,6 +8,7 @@
 
 #include "base/srgb.h"
 #include "viewer/view_based/view_based_renderer.h"
+#include "viewer/window/keyframe_buttons.h"
 #include "viewer/window/map_canvas.h"
 
 namespace scanview {
@@ -105,16 +106,7 @@ void draw_buttons(WalkPanelContent& content, WalkPanelAnswer& answer) {
   button("help (H)", Command::help);
   button("picture (P)", Command::save_picture);
   ImGui::SameLine();
-  button("keyframe (K)", Command::add_keyframe);
-  ImGui::SameLine();
-  ImGui::Text("%zu", content.keyframes);
-  if (content.keyframes == 0) return;
-  button("remove", Command::remove_keyframe);
-  ImGui::SameLine();
-  ImGui::PushItemWidth(0.35F * ImGui::GetContentRegionAvail().x);
-  ImGui::SliderInt("frames between", &content.frames_between, 1, 240, "%d", ImGuiSliderFlags_AlwaysClamp);
-  ImGui::PopItemWidth();
-  ImGui::TextWrapped("%s", content.keyframe_command.c_str());
+  draw_keyframe_buttons(content.keyframes, content.keyframe_command, content.frames_between, answer.commands);
 }
 
 void draw_used(WalkPanelContent const& content, float scale) {
