@@ -329,7 +329,7 @@ TEST(LdiGaps, AHoleIsFilledFromAround) {
   for (int y = first; y <= last; ++y)
     for (int x = first; x <= last; ++x) EXPECT_EQ(open.color(y, x)[3], 0) << x << ' ' << y;
   // The levels whose steps are wider than the hole reach all of it.
-  double const within = tree->merge_distance(tree->cells.back().key.level + 3);
+  double const within = tree->options.merge_distance(tree->cells.back().key.level + 3);
   for (int y = kWall / 2 - 4; y < kWall / 2 + 4; ++y)
     for (int x = kWall / 2 - 4; x < kWall / 2 + 4; ++x) {
       cv::Vec4b const& pixel = closed.color(y, x);

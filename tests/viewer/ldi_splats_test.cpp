@@ -195,7 +195,8 @@ TEST(LdiSplats, OrthographicPicturesAreOfTheSamePlane) {
           most = std::max(
               most, std::abs(double(frame.depth(y, x)) - depth_at(camera, pose, x, y, Vector3d::UnitZ(), kMiddle.z())));
       // Squares are farther at their edges and do not follow the plane (see above).
-      EXPECT_LE(most, splats == Splats::squares ? (8 + 0.6) * ldi_step(coarsest) : tree->merge_distance(coarsest));
+      EXPECT_LE(most,
+                splats == Splats::squares ? (8 + 0.6) * ldi_step(coarsest) : tree->options.merge_distance(coarsest));
     }
 }
 
@@ -231,7 +232,7 @@ TEST(LdiBlended, APlaneKeepsItsColourAndIsOpaqueAndWhereItIs) {
       Frame const frame = renderer.render(camera, pose);
       EXPECT_LE(color_error(frame, kFront), kExact);
       // From stamps' to pixels' size steps double.
-      double const within = tree->merge_distance(tree->cells.back().key.level) * (step_px < stamp_px ? 2 : 1);
+      double const within = tree->options.merge_distance(tree->cells.back().key.level) * (step_px < stamp_px ? 2 : 1);
       double most = 0;
       int least = 255;
       for (int y = 0; y < 64; ++y)

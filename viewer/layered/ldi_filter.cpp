@@ -99,7 +99,7 @@ class Merger {
 
  private:
   static bool has(LdiSums const* sums, int face) { return sums != nullptr && sums->has_face(face); }
-  double merge_steps(int level) const { return std::max(options_.merge_steps, options_.depth_error / ldi_step(level)); }
+  double merge_steps(int level) const { return options_.merge_distance(level) / ldi_step(level); }
 
   void merge_place(int face, int x, int y) {
     constexpr double kRounding = 1.0 / 128;  // of coverages in 8 bits

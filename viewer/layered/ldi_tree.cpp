@@ -91,10 +91,6 @@ std::size_t LdiTree::pixel_count() const {
 
 std::size_t LdiTree::bytes() const { return content.size() + cells.size() * sizeof(LdiCell); }
 
-double LdiTree::merge_distance(int level) const {
-  return std::max(options.merge_steps * ldi_step(level), options.depth_error);
-}
-
 Eigen::AlignedBox3d LdiTree::box(LdiCell const& cell) const {
   Eigen::Vector3d const corner = ldi_corner(cell.key, options.resolution);
   double const side = options.resolution * ldi_step(cell.key.level);

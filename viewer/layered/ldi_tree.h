@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -32,6 +33,8 @@ struct LdiOptions {
   enum class Normals { measured, facing } normals = Normals::measured;  ///< StampOptions
 
   void validate() const;  ///< Throws Error{usage} naming the field and its range.
+  /// Depths of that level's pixels that differ by less are one surface.
+  double merge_distance(int level) const { return std::max(merge_steps * ldi_step(level), depth_error); }
   /// Depth bins of a level are 2^bin_shift steps deep: as deep as the images are uncertain. Noise does not fill bin
   /// after bin.
   int bin_shift(int level) const;
@@ -75,8 +78,6 @@ class LdiTree {
 
   std::size_t pixel_count() const;
   std::size_t bytes() const;  ///< of cells, blocks and pixels: what rendering needs
-  /// Depths of that level's pixels that differ by less are one surface.
-  double merge_distance(int level) const;
   Eigen::AlignedBox3d box(LdiCell const& cell) const;
   /// Sets center and radius: the median of the pixels of the coarsest level that has any, and the distance of 99 %
   /// of them.

@@ -107,7 +107,7 @@ SplatTransform transform_of(LdiTree const& tree, LdiCell const& cell, int face, 
   transform.step = static_cast<float>(ldi_step(cell.key.level) * std::sqrt(camera.fx() * camera.fy()));
   // Of uncertain depths normals are uncertain.
   transform.doubt = tree.options.depth_error > ldi_step(cell.key.level) ? 1 : 0;
-  transform.tolerance = static_cast<float>(tree.merge_distance(cell.key.level));
+  transform.tolerance = static_cast<float>(tree.options.merge_distance(cell.key.level));
   transform.near = static_cast<float>(near);
   // A fifth of the picture's size, as what is about as far away has where perspective is.
   transform.deepest = static_cast<float>(0.2 * std::max(camera.width() / camera.fx(), camera.height() / camera.fy()));
