@@ -160,23 +160,36 @@ TEST(LdiTraversal, GoesAsFarDownAsTheScreenNeedsAndNoFarther) {
   }
 }
 
-TEST(LdiTraversal, ACellAroundTheEyeIsDescended) {
+TEST(LdiTraversal, ACellAroundTheEyeOrWhoseFaceItIsOnIsDescended) {
   auto const tree = corner_tree();
   std::size_t count = 0;
   for (LdiCell const& cell : tree->cells) {
     if (!cell.has_children()) continue;
-    Vector3d const eye = tree->box(cell).center();
+    Eigen::AlignedBox3d const box = tree->box(cell);
     TraversalOptions how;
     how.stamp_px = 64;
     // However little a step is on the screen.
     Camera const camera = Camera::perspective(8, 8, 1, 1, 3.5, 3.5);
-    ByCell const drawn = by_cell(traverse(*tree, camera, toward(eye, {-2, -1.5, -2}), how));
+    Vector3d const middle = box.center();
+    Vector3d const on_face(box.min().x(), middle.y(), middle.z());
     std::int32_t const number = static_cast<std::int32_t>(&cell - tree->cells.data());
-    ASSERT_TRUE(drawn.contains(number));
-    EXPECT_TRUE(drawn.at(number).descended);
+    for (auto const& [eye, target] : {std::pair(middle, Vector3d(-2, -1.5, -2)), std::pair(on_face, middle)}) {
+      ByCell const drawn = by_cell(traverse(*tree, camera, toward(eye, target), how));
+      ASSERT_TRUE(drawn.contains(number));
+      EXPECT_TRUE(drawn.at(number).descended);
+    }
     ++count;
   }
   EXPECT_GT(count, 20U);
+}
+
+TEST(LdiTraversal, FromFarOutsideOnlyTheRootsAreDrawn) {
+  auto const tree = corner_tree();
+  Vector3d const center = tree->center;
+  auto const cells = traverse(*tree, Camera::perspective(64, 64, 32, 32, 31.5, 31.5),
+                              toward(center + Vector3d(1e6, 2e6, 3e6), center), {});
+  EXPECT_EQ(cells.size(), tree->roots.size());
+  for (TraversedCell const& at : cells) EXPECT_FALSE(at.descended);
 }
 
 TEST(LdiTraversal, WhatIsPostponedAndWhatIsBelowAreTheWhole) {
